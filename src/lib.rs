@@ -1,0 +1,5 @@
+//! Volumetric cumulus skies in raw Vulkan.
+
+pub mod error;
+
+pub use error::{Error, Result};

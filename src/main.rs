@@ -1,0 +1,3 @@
+//! The `welkin` program.
+
+fn main() {}
