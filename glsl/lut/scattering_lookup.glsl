@@ -1,0 +1,82 @@
+// The scattering tables of the homogeneous sphere (Yusov 4.2, 4.3), lit by a parallel beam of unit irradiance.
+//
+// One RG image holds both: x = single, y = multiple (2 and more) scattering, each divided by 1 - exp(-tau), where tau is
+// the optical depth of the ray's chord. That quotient is the mean source function seen along the ray (the colour C of
+// the compositing stages): it stays finite and smooth where the chord shrinks to nothing, and a look-up multiplies back.
+//
+// A ray is described as the eye sees it, because the functions are smooth in these coordinates and the forward peak then
+// lies along one axis:
+//   Theta  scattering angle, cos Theta = -dot(to_sun, to_eye), 0 = looking into the sun, [0, π], dense at 0 (∝ t²);
+//   psi    azimuth, about the ray, between the side of the sphere on which the ray runs and the sun, [0, π] by symmetry;
+//   mu     cosine of the zenith angle of the ray at its entry point; the chord is 2 mu radii, b = sqrt(1 - mu²) is the
+//          impact parameter. Placed by the chord's optical depth: 2 R mu = c · sinh(t · asinh(2 R / c)), so that grazing
+//          rays of thick spheres are resolved;
+//   R      optical radius sigma_t · density · radius, evenly in log2.
+// Layout of the 3D image: x = Theta, y = psi, z = level · N_mu + mu; domain ends on texel centres.
+// Below the range the colours continue as R → 0 demands (single → 1, multiple ∝ R); above it they are constant.
+// CPU twin of the mappings: src/lut/axes.rs.
+#ifndef WELKIN_LUT_SCATTERING_LOOKUP_GLSL
+#define WELKIN_LUT_SCATTERING_LOOKUP_GLSL
+
+// Shared with src/lut/axes.rs (asserted equal by tests/tables.rs).
+const float SCATTERING_LEVELS = 8.0;
+const float SCATTERING_R_MIN = 0.5;     // optical radius of level 0
+const float SCATTERING_R_MAX = 128.0;   // optical radius of the last level
+const float SCATTERING_MU_SCALE = 1.0;  // c: optical depth below which chords are spaced evenly (tuned)
+
+// (Theta, psi, mu) of a ray.
+vec3 scattering_coordinates(vec3 entry_us, vec3 dir_us, vec3 to_sun_us) {
+    float mu = clamp(-dot(entry_us, dir_us), 0.0, 1.0);
+    float cos_theta = clamp(dot(to_sun_us, dir_us), -1.0, 1.0);
+    // atan2 keeps the small angles of the forward direction that acos would lose.
+    float theta = atan(length(cross(to_sun_us, dir_us)), cos_theta);
+    vec3 side = entry_us + mu * dir_us;                     // centre → ray, at the closest point
+    vec3 sun = to_sun_us - cos_theta * dir_us;
+    float y = length(cross(side, sun)), x = dot(side, sun);
+    float psi = abs(x) + y < 1e-12 ? 0.0 : atan(y, x);
+    return vec3(theta, psi, mu);
+}
+
+// Mean source functions (single without phase function [1], multiple [1/sr]) at one level of optical radius.
+vec2 scattering_level_fetch(sampler3D lut, vec3 coordinates, float optical_radius, float level, vec3 size) {
+    float n_mu = size.z / SCATTERING_LEVELS;
+    float full = 2.0 * optical_radius / SCATTERING_MU_SCALE;
+    float t_mu = asinh(full * coordinates.z) / asinh(full);
+    vec3 t = vec3(sqrt(coordinates.x * 0.3183098861837907), coordinates.y * 0.3183098861837907, t_mu);
+    vec3 texel = clamp(t, 0.0, 1.0) * (vec3(size.xy, n_mu) - 1.0) + 0.5;
+    texel.z += level * n_mu;
+    return textureLod(lut, texel / size, 0.0).xy;
+}
+
+// x: mean source function of single scattering, without the phase function; y: of multiple scattering [1/sr].
+vec2 scattering_source_lookup(sampler3D lut, vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float optical_radius) {
+    vec3 size = vec3(textureSize(lut, 0));
+    vec3 coordinates = scattering_coordinates(entry_us, dir_us, to_sun_us);
+    float r = clamp(optical_radius, SCATTERING_R_MIN, SCATTERING_R_MAX);
+    float level = log2(r / SCATTERING_R_MIN) * ((SCATTERING_LEVELS - 1.0) / log2(SCATTERING_R_MAX / SCATTERING_R_MIN));
+    float lower = clamp(floor(level), 0.0, SCATTERING_LEVELS - 2.0);
+    vec2 a = scattering_level_fetch(lut, coordinates, r, lower, size);
+    vec2 b = scattering_level_fetch(lut, coordinates, r, lower + 1.0, size);
+    vec2 source = mix(a, b, level - lower);
+    float below = min(optical_radius / SCATTERING_R_MIN, 1.0);
+    return vec2(1.0 - (1.0 - source.x) * below, source.y * below);
+}
+
+// 1 - exp(-tau), without cancellation for thin media.
+float scattering_opacity(float tau) {
+    return tau < 1e-2 ? tau * (1.0 - tau * (0.5 - tau * (1.0 / 6.0))) : 1.0 - exp(-tau);
+}
+
+// Single scattering (Yusov, Eq. 9) of the ray [1]: multiply by phase function and irradiance for radiance.
+float single_scattering_lookup(sampler3D lut, vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float optical_radius) {
+    float tau = 2.0 * optical_radius * max(-dot(entry_us, dir_us), 0.0);
+    return scattering_source_lookup(lut, entry_us, dir_us, to_sun_us, optical_radius).x * scattering_opacity(tau);
+}
+
+// Radiance of light scattered twice or more, for unit irradiance [1/sr].
+float multiple_scattering_lookup(sampler3D lut, vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float optical_radius) {
+    float tau = 2.0 * optical_radius * max(-dot(entry_us, dir_us), 0.0);
+    return scattering_source_lookup(lut, entry_us, dir_us, to_sun_us, optical_radius).y * scattering_opacity(tau);
+}
+
+#endif
