@@ -58,7 +58,19 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// Why, in a sentence; for text files with line and column.
+        /// Why, in a sentence.
+        reason: String,
+    },
+    /// A text file is wrong at a known place.
+    #[error("{}:{line}:{column}: {reason}", path.display())]
+    FileAt {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column in characters, from 1.
+        column: usize,
+        /// What is wrong, naming the field, the value and what was expected.
         reason: String,
     },
     /// A list on the device stayed too small although it was grown.

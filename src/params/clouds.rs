@@ -1,0 +1,256 @@
+//! The clouds: where they come from, what they are made of, how they are lit.
+
+use std::path::PathBuf;
+
+use super::check;
+use crate::{Error, Result};
+
+/// The cloud layer or list of cloud particles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clouds {
+    /// Where particles come from. Default [`Source::Grid`].
+    pub source: Source,
+    /// How particles are lit. Default [`Lighting::Tables`].
+    pub lighting: Lighting,
+    /// The density inside a particle. Default [`Style::Pyroclastic`], whose billows look most like cumulus (Yusov, Fig. 4).
+    pub style: Style,
+    /// Chooses the sky: the same seed gives the same clouds. Default 1.
+    pub seed: u32,
+    /// Altitude of the layer's base above sea level [m]. Default 3000 (the authors' scene).
+    pub altitude: f32,
+    /// Height of the layer, base to top [m]. Default 700 (the authors' scene).
+    pub thickness: f32,
+    /// How much of the sky is cloud. Default 0.6 everywhere.
+    pub coverage: Coverage,
+    /// Extinction of the medium at relative density 1 [1/m]. Default 0.07 (Yusov 5.1).
+    pub sigma_t: f32,
+    /// Single-scattering albedo. Default 1: water droplets absorb next to nothing of visible light.
+    pub albedo: f32,
+    /// The phase function. Default Cornette–Shanks (Yusov, Eq. 7).
+    pub phase: Phase,
+    /// Asymmetry of the phase function for light scattered once. Default 0.9 (Yusov 4).
+    pub g_single: f32,
+    /// Asymmetry of the phase function for light scattered more than once. Default 0.7 (Yusov 4).
+    pub g_multiple: f32,
+    /// Orders of scattering in the tables; 0 sums until converged. Default 0; Yusov stops at 18.
+    pub orders: u32,
+    /// Scale of an occluding particle's extinction on the way to the sun, ξ. Default 0.05 (the authors' scene): a
+    /// particle between the sun and another one scatters most of what it takes forward again.
+    pub xi: f32,
+    /// No particle is made farther from the camera than this [m]. Default 1e5 (the authors' scene).
+    pub particle_cutoff: f32,
+}
+
+/// Where particles come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// Procedural, in nested rings of cells around the camera (Yusov 5.2).
+    Grid,
+    /// An explicit list.
+    Particles(Vec<ParticleDesc>),
+    /// A dense or sparse volume from a file.
+    Voxels {
+        /// The file.
+        file: PathBuf,
+        /// Name of the grid inside the file.
+        grid: String,
+        /// Relative density per unit of the grid's value.
+        density_scale: f32,
+    },
+}
+
+/// One ellipsoid of cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParticleDesc {
+    /// Centre [m].
+    pub centre: [f64; 3],
+    /// Semi-axes [m].
+    pub radii: [f32; 3],
+    /// Unit quaternion x, y, z, w that turns the ellipsoid's axes into the world.
+    pub rotation: [f32; 4],
+    /// Density relative to [`Clouds::sigma_t`].
+    pub density: f32,
+    /// Radiance of the particle's own light as [`Lighting::Flat`] takes it: a thick particle shows exactly this.
+    pub colour: [f32; 3],
+}
+
+impl Default for ParticleDesc {
+    fn default() -> Self {
+        Self { centre: [0.0; 3], radii: [100.0; 3], rotation: [0.0, 0.0, 0.0, 1.0], density: 1.0, colour: [1.0; 3] }
+    }
+}
+
+/// How particles are lit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lighting {
+    /// Pre-computed optical depth, single and multiple scattering (Yusov 4).
+    Tables,
+    /// Each particle its own constant colour.
+    Flat,
+    /// Multiple forward scattering and eye scattering (Harris 2, Stoian 3–4).
+    Forward,
+    /// Order-free attenuation volume (Shimada 3).
+    Attenuation,
+    /// Ray marching with shadow rays (Bajkowski 3.2).
+    March,
+    /// Ray marching with cached sun transmittance (Bajkowski 3.3).
+    MarchCached,
+    /// Ray marching with several octaves of scattering (Bajkowski 3.4).
+    MarchMulti,
+    /// Path tracing.
+    Path,
+}
+
+/// The density inside a particle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Radial fall-off plus noise.
+    Radial,
+    /// Noise above a threshold.
+    Threshold,
+    /// A ball whose surface is displaced by noise.
+    Pyroclastic,
+    /// Constant 1.
+    Homogeneous,
+}
+
+/// The phase function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Cornette–Shanks (Yusov, Eq. 7).
+    CornetteShanks,
+    /// Henyey–Greenstein.
+    HenyeyGreenstein,
+}
+
+/// How much of the sky is cloud.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Coverage {
+    /// The same everywhere: 0 is a clear sky, 1 an overcast one.
+    Uniform(f32),
+    /// From a picture.
+    Map(CoverageMap),
+}
+
+/// Coverage as a picture seen from above, centred on the world's origin and repeated: columns grow to the east (+x), rows
+/// to the south (+z), so that it reads as a map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoverageMap {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Coverage 0 to 1 of each texel, row by row, northernmost first.
+    pub values: Vec<f32>,
+    /// What the picture's width measures in the world [m]; the height follows from square texels.
+    pub extent: f32,
+}
+
+impl Default for Clouds {
+    fn default() -> Self {
+        Self {
+            source: Source::Grid,
+            lighting: Lighting::Tables,
+            style: Style::Pyroclastic,
+            seed: 1,
+            altitude: 3000.0,
+            thickness: 700.0,
+            coverage: Coverage::Uniform(0.6),
+            sigma_t: 0.07,
+            albedo: 1.0,
+            phase: Phase::CornetteShanks,
+            g_single: 0.9,
+            g_multiple: 0.7,
+            orders: 0,
+            xi: 0.05,
+            particle_cutoff: 1.0e5,
+        }
+    }
+}
+
+impl Clouds {
+    /// Checks every field; whether the choices go together is checked by [`super::Params::validate`].
+    ///
+    /// # Errors
+    /// Names the field, the value and what is accepted.
+    pub fn validate(&self) -> Result<()> {
+        match &self.source {
+            Source::Grid => {}
+            Source::Particles(particles) => {
+                for (index, particle) in particles.iter().enumerate() {
+                    particle.validate(|| format!("clouds.particle[{index}]"))?;
+                }
+            }
+            Source::Voxels { density_scale, .. } => {
+                check::positive("clouds.density_scale", *density_scale, 1.0e6, "")?;
+            }
+        }
+        match &self.coverage {
+            Coverage::Uniform(coverage) => check::within("clouds.coverage", *coverage, 0.0..=1.0, "")?,
+            Coverage::Map(map) => map.validate()?,
+        }
+        check::within("clouds.altitude", self.altitude, 0.0..=5.0e4, "m")?;
+        check::positive("clouds.thickness", self.thickness, 2.0e4, "m")?;
+        check::positive("clouds.sigma_t", self.sigma_t, 10.0, "1/m")?;
+        check::within("clouds.albedo", self.albedo, 0.0..=1.0, "")?;
+        check::within("clouds.g_single", self.g_single, -0.99..=0.99, "")?;
+        check::within("clouds.g_multiple", self.g_multiple, -0.99..=0.99, "")?;
+        check::within("clouds.orders", self.orders, 0..=1000, "(0: until converged)")?;
+        check::within("clouds.xi", self.xi, 0.0..=1.0, "")?;
+        check::within("clouds.particle_cutoff", self.particle_cutoff, 1.0e3..=1.0e6, "m")
+    }
+}
+
+impl ParticleDesc {
+    /// Checks every field. `name` is what an error calls the particle; it is only asked for when something is wrong, since
+    /// lists are long.
+    ///
+    /// # Errors
+    /// Names the field, the value and what is accepted.
+    pub fn validate(&self, name: impl Fn() -> String) -> Result<()> {
+        let field = |field: &str| format!("{}.{field}", name());
+        let near = |v: f64| v.abs() <= check::MAX_COORDINATE;
+        if !self.centre.iter().all(|&v| near(v)) {
+            let range = -check::MAX_COORDINATE..=check::MAX_COORDINATE;
+            check::each_within(&field("centre"), self.centre, range, "m")?;
+        }
+        for (axis, &radius) in self.radii.iter().enumerate() {
+            if !(radius > 0.0 && radius <= 1.0e6) {
+                check::positive(&field(&format!("radii[{axis}]")), radius, 1.0e6, "m")?;
+            }
+        }
+        let length = self.rotation.iter().map(|c| c * c).sum::<f32>().sqrt();
+        // 1e-3: a quaternion written with four digits passes; the shaders normalise nothing.
+        if !(0.999..=1.001).contains(&length) {
+            return Err(Error::invalid(
+                field("rotation"),
+                format!("{:?}", self.rotation),
+                "a unit quaternion x, y, z, w",
+            ));
+        }
+        if !(0.0..=1.0e3).contains(&self.density) {
+            check::within(&field("density"), self.density, 0.0..=1.0e3, "")?;
+        }
+        if !self.colour.iter().all(|c| (0.0..=1.0e6).contains(c)) {
+            check::each_within(&field("colour"), self.colour, 0.0..=1.0e6, "")?;
+        }
+        Ok(())
+    }
+}
+
+impl CoverageMap {
+    fn validate(&self) -> Result<()> {
+        let size = format!("{}x{}", self.width, self.height);
+        if self.width == 0 || self.height == 0 || self.width > 16_384 || self.height > 16_384 {
+            return Err(Error::invalid("clouds.coverage_map", size, "a picture of 1x1 to 16384x16384 pixels"));
+        }
+        if self.values.len() as u64 != u64::from(self.width) * u64::from(self.height) {
+            let expected = format!("{size} values");
+            return Err(Error::invalid("clouds.coverage_map", format!("{} values", self.values.len()), expected));
+        }
+        if let Some(bad) = self.values.iter().find(|v| !(0.0..=1.0).contains(*v)) {
+            return Err(Error::invalid("clouds.coverage_map", bad, "values from 0 to 1"));
+        }
+        check::within("clouds.coverage_map_extent", self.extent, 1.0e2..=1.0e7, "m")
+    }
+}

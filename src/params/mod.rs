@@ -1,0 +1,169 @@
+//! Everything a picture depends on, as plain data: SI units, angles in degrees, defaults with their source.
+//!
+//! [`Params::default`] is a good sky. [`Params::validate`] names every bad field as a scene file writes it; the renderer
+//! refuses parameters that do not pass. Reading them from a scene file is the business of [`crate::scene`] (feature
+//! `files`); an engine fills the structs itself.
+//!
+//! World axes: right-handed, +y up, +x east, −z north, metres; `y = 0` is sea level. Yaw and azimuth are compass angles:
+//! 0 is north (−z), 90 is east (+x). Pitch and elevation grow upwards.
+
+mod axes;
+mod camera;
+mod check;
+mod clouds;
+mod quality;
+mod sky;
+pub mod solar;
+mod sun;
+
+pub use axes::{AxisValue, BLENDS, LIGHTINGS, PHASES, SOURCES, STYLES, SourceKind, lookup};
+pub use camera::{Aim, Animation, Basis, Camera};
+pub use clouds::{Clouds, Coverage, CoverageMap, Lighting, ParticleDesc, Phase, Source, Style};
+pub use quality::{Blend, Precision, Preset, Quality};
+pub use sky::{Film, Ground, Sky, SkyModel, ToneCurve};
+pub use sun::{Sun, SunPosition};
+
+use crate::Result;
+
+/// All parameters of a picture or a sequence of pictures.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Params {
+    /// Where the picture is taken from.
+    pub camera: Camera,
+    /// The light.
+    pub sun: Sun,
+    /// What is drawn.
+    pub clouds: Clouds,
+    /// How finely it is drawn, and by which compositing mode.
+    pub quality: Quality,
+    /// The clear sky and the ground.
+    pub sky: Sky,
+    /// From radiance to display values.
+    pub film: Film,
+    /// What changes from one frame of a sequence to the next.
+    pub animation: Animation,
+}
+
+impl Params {
+    /// Checks every field, and that this version has the chosen combination of source, lighting and compositing.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParam`](crate::Error::InvalidParam) naming the field as a scene file writes it, the value and what
+    /// would have been accepted, or [`Error::Unsupported`](crate::Error::Unsupported) for a choice that is known but not
+    /// in this version.
+    pub fn validate(&self) -> Result<()> {
+        self.camera.validate()?;
+        self.sun.validate()?;
+        self.clouds.validate()?;
+        self.quality.validate()?;
+        self.sky.validate()?;
+        self.film.validate()?;
+        self.animation.validate()?;
+        axes::validate(self)?;
+        if self.sky.model == SkyModel::Atmosphere {
+            // Below sea level the clear sky's rays would start inside the planet.
+            check::within(
+                "camera.position[1]",
+                self.camera.position[1],
+                0.0..=1.0e6,
+                "m, with sky.model = \"atmosphere\"",
+            )?;
+        }
+        Ok(())
+    }
+
+    /// The parameters of frame `frame`: the camera moved and turned by [`Animation`]; frame 0 is `self`.
+    #[must_use]
+    pub fn at_frame(&self, frame: u32) -> Self {
+        let mut params = self.clone();
+        params.camera = self.animation.camera_at(&self.camera, frame);
+        params
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Error;
+
+    /// The field that validation blames after `change` has been made to the defaults.
+    pub(super) fn blamed(change: impl FnOnce(&mut Params)) -> String {
+        let mut params = Params::default();
+        change(&mut params);
+        match params.validate() {
+            Err(Error::InvalidParam { field, .. }) => field,
+            Err(Error::Unsupported { needed, .. }) => format!("unsupported {needed}"),
+            Err(other) => panic!("unexpected error: {other}"),
+            Ok(()) => "nothing".into(),
+        }
+    }
+
+    #[test]
+    fn the_defaults_are_valid() {
+        assert_eq!(blamed(|_| ()), "nothing");
+    }
+
+    #[test]
+    fn every_bad_field_is_named_as_a_scene_file_writes_it() {
+        assert_eq!(blamed(|p| p.camera.position[0] = f64::NAN), "camera.position[0]");
+        assert_eq!(blamed(|p| p.camera.position[1] = -1.0), "camera.position[1]");
+        assert_eq!(blamed(|p| p.camera.fov_y = 180.0), "camera.fov_y");
+        assert_eq!(blamed(|p| p.camera.aim = Aim::LookAt(p.camera.position)), "camera.look_at");
+        assert_eq!(blamed(|p| p.camera.aim = Aim::Angles { yaw: 0.0, pitch: 91.0 }), "camera.pitch");
+        assert_eq!(blamed(|p| p.sun.position = SunPosition::Angles { elevation: 95.0, azimuth: 0.0 }), "sun.elevation");
+        assert_eq!(blamed(|p| p.sun.irradiance[2] = -1.0), "sun.irradiance[2]");
+        assert_eq!(blamed(|p| p.clouds.coverage = Coverage::Uniform(-0.1)), "clouds.coverage");
+        assert_eq!(blamed(|p| p.clouds.coverage = Coverage::Uniform(f32::NAN)), "clouds.coverage");
+        assert_eq!(blamed(|p| p.clouds.thickness = 0.0), "clouds.thickness");
+        assert_eq!(blamed(|p| p.clouds.sigma_t = -0.07), "clouds.sigma_t");
+        assert_eq!(blamed(|p| p.clouds.g_single = 1.0), "clouds.g_single");
+        assert_eq!(blamed(|p| p.clouds.albedo = 1.5), "clouds.albedo");
+        assert_eq!(blamed(|p| p.clouds.particle_cutoff = f32::INFINITY), "clouds.particle_cutoff");
+        assert_eq!(blamed(|p| p.quality.downscale = 3), "quality.downscale");
+        assert_eq!(blamed(|p| p.quality.cells = 100), "quality.cells");
+        assert_eq!(blamed(|p| p.film.exposure_ev = f32::INFINITY), "film.exposure_ev");
+        assert_eq!(blamed(|p| p.animation.velocity[1] = f64::NAN), "animation.velocity[1]");
+    }
+
+    #[test]
+    fn a_bad_particle_is_named_by_its_number() {
+        let with = |particle: ParticleDesc| {
+            blamed(|p| p.clouds.source = Source::Particles(vec![ParticleDesc::default(), particle]))
+        };
+        let good = ParticleDesc::default();
+        assert_eq!(with(good), "nothing");
+        assert_eq!(with(ParticleDesc { radii: [1.0, 0.0, 1.0], ..good }), "clouds.particle[1].radii[1]");
+        assert_eq!(with(ParticleDesc { rotation: [0.0; 4], ..good }), "clouds.particle[1].rotation");
+        assert_eq!(with(ParticleDesc { density: -1.0, ..good }), "clouds.particle[1].density");
+    }
+
+    #[test]
+    fn names_that_are_known_but_not_here_yet_say_so() {
+        let forward = blamed(|p| p.clouds.lighting = Lighting::Forward);
+        assert_eq!(forward, "unsupported clouds.lighting = \"forward\"");
+        assert!(
+            blamed(|p| p.clouds.lighting = Lighting::Flat).starts_with("unsupported clouds.lighting = \"flat\" with")
+        );
+        let flat_particles = blamed(|p| {
+            p.clouds.lighting = Lighting::Flat;
+            p.clouds.source = Source::Particles(vec![ParticleDesc::default()]);
+        });
+        assert_eq!(flat_particles, "nothing");
+        assert!(blamed(|p| p.quality.blend = Blend::Tiled).starts_with("unsupported quality.blend = \"tiled\""));
+        assert!(
+            blamed(|p| p.quality.blend = Blend::Interlock(4))
+                .starts_with("unsupported quality.blend = \"interlock:4\"")
+        );
+    }
+
+    #[test]
+    fn frames_move_and_turn_the_camera() {
+        let animation = Animation { velocity: [10.0, 0.0, -2.0], yaw_rate: 1.5, pitch_rate: 0.0 };
+        let params = Params { animation, ..Params::default() };
+        let later = params.at_frame(4);
+        let [x, y, z] = params.camera.position;
+        assert_eq!(later.camera.position, [x + 40.0, y, z - 8.0]);
+        assert_eq!(later.camera.aim, Aim::Angles { yaw: 6.0, pitch: 8.0 });
+        assert_eq!(params.at_frame(0), params);
+    }
+}
