@@ -2,6 +2,8 @@
 
 pub mod error;
 pub mod params;
+#[cfg(feature = "files")]
+pub mod scene;
 
 pub use error::{Error, Result};
 pub use params::Params;

@@ -1,0 +1,360 @@
+//! The keys of a scene file and how they become [`Params`].
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toml::value::{Datetime, Offset};
+
+use super::{coverage, particles};
+use crate::params::{
+    Aim, Animation, Camera, Clouds, Coverage, Film, Ground, LIGHTINGS, PHASES, Params, Precision, Preset, Quality,
+    SOURCES, STYLES, Sky, SkyModel, Source, SourceKind, Sun, SunPosition, ToneCurve, lookup, solar,
+};
+use crate::{Error, Result};
+
+/// A whole scene file.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scene {
+    camera: CameraKeys,
+    sun: SunKeys,
+    clouds: CloudKeys,
+    quality: QualityKeys,
+    sky: SkyKeys,
+    film: FilmKeys,
+    animation: AnimationKeys,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct CameraKeys {
+    position: Option<[f64; 3]>,
+    yaw: Option<f64>,
+    pitch: Option<f64>,
+    look_at: Option<[f64; 3]>,
+    fov_y: Option<f64>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct SunKeys {
+    elevation: Option<f64>,
+    azimuth: Option<f64>,
+    time: Option<Datetime>,
+    latitude: Option<f64>,
+    longitude: Option<f64>,
+    irradiance: Option<[f32; 3]>,
+    angular_radius: Option<f32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct CloudKeys {
+    source: Option<String>,
+    lighting: Option<String>,
+    style: Option<String>,
+    seed: Option<u32>,
+    altitude: Option<f32>,
+    thickness: Option<f32>,
+    coverage: Option<f32>,
+    coverage_map: Option<PathBuf>,
+    coverage_map_extent: Option<f32>,
+    sigma_t: Option<f32>,
+    albedo: Option<f32>,
+    phase: Option<String>,
+    g_single: Option<f32>,
+    g_multiple: Option<f32>,
+    orders: Option<u32>,
+    xi: Option<f32>,
+    particle_cutoff: Option<f32>,
+    file: Option<PathBuf>,
+    particle: Option<Vec<ParticleKeys>>,
+    grid: Option<String>,
+    density_scale: Option<f32>,
+}
+
+/// One `[[clouds.particle]]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParticleKeys {
+    /// Centre [m].
+    pub centre: [f64; 3],
+    /// Semi-axes [m].
+    pub radii: [f32; 3],
+    /// Quaternion x, y, z, w of any length but 0.
+    pub rotation: Option<[f32; 4]>,
+    /// Relative density.
+    pub density: Option<f32>,
+    /// Flat colour.
+    pub colour: Option<[f32; 3]>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct QualityKeys {
+    preset: Option<String>,
+    cells: Option<u32>,
+    rings: Option<u32>,
+    layers: Option<u32>,
+    downscale: Option<u32>,
+    precision: Option<String>,
+    blend: Option<String>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct SkyKeys {
+    model: Option<String>,
+    ground: Option<String>,
+    ground_albedo: Option<[f32; 3]>,
+    haze: Option<f32>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct FilmKeys {
+    exposure_ev: Option<f32>,
+    curve: Option<String>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct AnimationKeys {
+    velocity: Option<[f64; 3]>,
+    yaw_rate: Option<f64>,
+    pitch_rate: Option<f64>,
+}
+
+/// Puts a given value in place of a default.
+fn set<T>(target: &mut T, value: Option<T>) {
+    if let Some(value) = value {
+        *target = value;
+    }
+}
+
+/// As [`set`], for a value by name.
+fn set_named<T>(target: &mut T, name: Option<&String>, read: impl FnOnce(&str) -> Result<T>) -> Result<()> {
+    if let Some(name) = name {
+        *target = read(name)?;
+    }
+    Ok(())
+}
+
+/// The value of `name` in a short list of names.
+fn one_of<T: Copy>(field: &str, name: &str, names: &[(&str, T)]) -> Result<T> {
+    names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(|| {
+        let known: Vec<_> = names.iter().map(|(known, _)| *known).collect();
+        Error::invalid(field, name, format!("one of {}", known.join(", ")))
+    })
+}
+
+impl Scene {
+    /// The parameters that this scene stands for; files are relative to `base`.
+    pub fn into_params(self, base: &Path) -> Result<Params> {
+        Ok(Params {
+            camera: self.camera.into_params()?,
+            sun: self.sun.into_params()?,
+            clouds: self.clouds.into_params(base)?,
+            quality: self.quality.into_params()?,
+            sky: self.sky.into_params(base)?,
+            film: self.film.into_params()?,
+            animation: self.animation.into_params(),
+        })
+    }
+}
+
+impl CameraKeys {
+    fn into_params(self) -> Result<Camera> {
+        let mut camera = Camera::default();
+        set(&mut camera.position, self.position);
+        set(&mut camera.fov_y, self.fov_y);
+        match (self.look_at, self.yaw.is_some() || self.pitch.is_some()) {
+            (Some(target), false) => camera.aim = Aim::LookAt(target),
+            (Some(target), true) => {
+                return Err(Error::invalid("camera.look_at", format!("{target:?}"), "either look_at or yaw and pitch"));
+            }
+            (None, _) => {
+                if let Aim::Angles { yaw, pitch } = &mut camera.aim {
+                    set(yaw, self.yaw);
+                    set(pitch, self.pitch);
+                }
+            }
+        }
+        Ok(camera)
+    }
+}
+
+impl SunKeys {
+    fn into_params(self) -> Result<Sun> {
+        let mut sun = Sun::default();
+        set(&mut sun.irradiance, self.irradiance);
+        set(&mut sun.angular_radius, self.angular_radius);
+        if let Some(time) = self.time {
+            if self.elevation.is_some() || self.azimuth.is_some() {
+                return Err(Error::invalid(
+                    "sun.time",
+                    time,
+                    "either time, latitude and longitude or elevation and azimuth",
+                ));
+            }
+            let (Some(latitude), Some(longitude)) = (self.latitude, self.longitude) else {
+                return Err(Error::invalid("sun.time", time, "sun.latitude and sun.longitude beside it"));
+            };
+            sun.position = SunPosition::Time { unix_seconds: unix_seconds(time)?, latitude, longitude };
+            return Ok(sun);
+        }
+        for (field, value) in [("sun.latitude", self.latitude), ("sun.longitude", self.longitude)] {
+            if let Some(value) = value {
+                return Err(Error::invalid(field, value, "sun.time beside it"));
+            }
+        }
+        if let SunPosition::Angles { elevation, azimuth } = &mut sun.position {
+            set(elevation, self.elevation);
+            set(azimuth, self.azimuth);
+        }
+        Ok(sun)
+    }
+}
+
+/// Seconds since 1970-01-01T00:00:00Z.
+fn unix_seconds(time: Datetime) -> Result<f64> {
+    let (Some(date), Some(clock), Some(offset)) = (time.date, time.time, time.offset) else {
+        return Err(Error::invalid("sun.time", time, "a date and time with zone, such as 2026-06-21T16:00:00Z"));
+    };
+    let offset_minutes = match offset {
+        Offset::Z => 0,
+        Offset::Custom { minutes } => minutes,
+    };
+    let second = f64::from(clock.second.unwrap_or(0)) + f64::from(clock.nanosecond.unwrap_or(0)) * 1.0e-9;
+    let seconds =
+        f64::from(clock.hour) * 3600.0 + (f64::from(clock.minute) - f64::from(offset_minutes)) * 60.0 + second;
+    Ok(solar::unix_seconds(i32::from(date.year), u32::from(date.month), u32::from(date.day), seconds))
+}
+
+impl CloudKeys {
+    fn into_params(self, base: &Path) -> Result<Clouds> {
+        let mut clouds = Clouds::default();
+        set_named(&mut clouds.lighting, self.lighting.as_ref(), |name| lookup(LIGHTINGS, "clouds.lighting", name))?;
+        set_named(&mut clouds.style, self.style.as_ref(), |name| lookup(STYLES, "clouds.style", name))?;
+        set_named(&mut clouds.phase, self.phase.as_ref(), |name| lookup(PHASES, "clouds.phase", name))?;
+        set(&mut clouds.seed, self.seed);
+        set(&mut clouds.altitude, self.altitude);
+        set(&mut clouds.thickness, self.thickness);
+        set(&mut clouds.sigma_t, self.sigma_t);
+        set(&mut clouds.albedo, self.albedo);
+        set(&mut clouds.g_single, self.g_single);
+        set(&mut clouds.g_multiple, self.g_multiple);
+        set(&mut clouds.orders, self.orders);
+        set(&mut clouds.xi, self.xi);
+        set(&mut clouds.particle_cutoff, self.particle_cutoff);
+        clouds.coverage = self.coverage(base)?;
+        clouds.source = self.source(base)?;
+        Ok(clouds)
+    }
+
+    fn coverage(&self, base: &Path) -> Result<Coverage> {
+        let Some(file) = &self.coverage_map else {
+            if let Some(extent) = self.coverage_map_extent {
+                return Err(Error::invalid("clouds.coverage_map_extent", extent, "clouds.coverage_map beside it"));
+            }
+            return Ok(self.coverage.map_or(Clouds::default().coverage, Coverage::Uniform));
+        };
+        if let Some(coverage) = self.coverage {
+            return Err(Error::invalid("clouds.coverage", coverage, "either coverage or coverage_map"));
+        }
+        // 200 km: the longer of the two wavelengths of the procedural coverage.
+        let extent = self.coverage_map_extent.unwrap_or(2.0e5);
+        Ok(Coverage::Map(coverage::load(&base.join(file), extent)?))
+    }
+
+    fn source(self, base: &Path) -> Result<Source> {
+        let mut kind = SourceKind::Grid;
+        set_named(&mut kind, self.source.as_ref(), |name| lookup(SOURCES, "clouds.source", name))?;
+        let only = |key: &str, of: &str| Error::invalid(format!("clouds.{key}"), "…", format!("this key only {of}"));
+        if kind != SourceKind::Particles && self.particle.is_some() {
+            return Err(only("particle", "with clouds.source = \"particles\""));
+        }
+        if kind == SourceKind::Grid && self.file.is_some() {
+            return Err(only("file", "with clouds.source = \"particles\" or \"voxels\""));
+        }
+        if kind != SourceKind::Voxels {
+            let given = self.grid.as_ref().map(|_| "grid").or(self.density_scale.map(|_| "density_scale"));
+            if let Some(key) = given {
+                return Err(only(key, "with clouds.source = \"voxels\""));
+            }
+        }
+        match (kind, self.file, self.particle) {
+            (SourceKind::Grid, ..) => Ok(Source::Grid),
+            (SourceKind::Particles, Some(file), None) => particles::load(&base.join(file)).map(Source::Particles),
+            (SourceKind::Particles, None, Some(list)) if !list.is_empty() => {
+                particles::inline(list).map(Source::Particles)
+            }
+            (SourceKind::Particles, Some(_), Some(_)) => {
+                Err(Error::invalid("clouds.file", "…", "either file or [[clouds.particle]] tables"))
+            }
+            (SourceKind::Particles, None, _) => {
+                Err(Error::invalid("clouds.source", "particles", "clouds.file or [[clouds.particle]] tables beside it"))
+            }
+            (SourceKind::Voxels, Some(file), _) => Ok(Source::Voxels {
+                file: base.join(file),
+                grid: self.grid.unwrap_or_else(|| "density".into()),
+                density_scale: self.density_scale.unwrap_or(1.0),
+            }),
+            (SourceKind::Voxels, None, _) => Err(Error::invalid("clouds.source", "voxels", "clouds.file beside it")),
+        }
+    }
+}
+
+impl QualityKeys {
+    fn into_params(self) -> Result<Quality> {
+        const PRESETS: [(&str, Preset); 3] = [("low", Preset::Low), ("medium", Preset::Medium), ("high", Preset::High)];
+        const PRECISIONS: [(&str, Precision); 2] = [("f16", Precision::F16), ("f32", Precision::F32)];
+        let mut preset = Preset::default();
+        set_named(&mut preset, self.preset.as_ref(), |name| one_of("quality.preset", name, &PRESETS))?;
+        let mut quality = preset.quality();
+        set(&mut quality.cells, self.cells);
+        set(&mut quality.rings, self.rings);
+        set(&mut quality.layers, self.layers);
+        set(&mut quality.downscale, self.downscale);
+        set_named(&mut quality.precision, self.precision.as_ref(), |name| {
+            one_of("quality.precision", name, &PRECISIONS)
+        })?;
+        set_named(&mut quality.blend, self.blend.as_ref(), str::parse)?;
+        Ok(quality)
+    }
+}
+
+impl SkyKeys {
+    fn into_params(self, base: &Path) -> Result<Sky> {
+        const MODELS: [(&str, SkyModel); 2] = [("none", SkyModel::None), ("atmosphere", SkyModel::Atmosphere)];
+        let mut sky = Sky::default();
+        set_named(&mut sky.model, self.model.as_ref(), |name| one_of("sky.model", name, &MODELS))?;
+        match self.ground.as_deref() {
+            None | Some("none") => {}
+            Some(file) => sky.ground = Ground::Terrain(base.join(file)),
+        }
+        set(&mut sky.ground_albedo, self.ground_albedo);
+        set(&mut sky.haze, self.haze);
+        Ok(sky)
+    }
+}
+
+impl FilmKeys {
+    fn into_params(self) -> Result<Film> {
+        const CURVES: [(&str, ToneCurve); 2] = [("filmic", ToneCurve::Filmic), ("linear", ToneCurve::Linear)];
+        let mut film = Film::default();
+        set(&mut film.exposure_ev, self.exposure_ev);
+        set_named(&mut film.curve, self.curve.as_ref(), |name| one_of("film.curve", name, &CURVES))?;
+        Ok(film)
+    }
+}
+
+impl AnimationKeys {
+    fn into_params(self) -> Animation {
+        let mut animation = Animation::default();
+        set(&mut animation.velocity, self.velocity);
+        set(&mut animation.yaw_rate, self.yaw_rate);
+        set(&mut animation.pitch_rate, self.pitch_rate);
+        animation
+    }
+}
