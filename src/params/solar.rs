@@ -35,8 +35,8 @@ pub fn position(unix_seconds: f64, latitude: f64, longitude: f64) -> SolarPositi
 fn declination_and_equation_of_time(unix_seconds: f64) -> (f64, f64) {
     let julian_day = unix_seconds / 86_400.0 + 2_440_587.5;
     let t = (julian_day - 2_451_545.0) / 36_525.0; // Julian centuries since J2000
-    let mean_longitude = (280.466_46 + t * (36_000.76983 + t * 0.000_303_2)).to_radians();
-    let mean_anomaly = (357.529_11 + t * (35_999.05029 - t * 0.000_153_7)).to_radians();
+    let mean_longitude = (280.466_46 + t * (36_000.769_83 + t * 0.000_303_2)).to_radians();
+    let mean_anomaly = (357.529_11 + t * (35_999.050_29 - t * 0.000_153_7)).to_radians();
     let eccentricity = 0.016_708_634 - t * (0.000_042_037 + t * 0.000_000_126_7);
     let centre = mean_anomaly.sin() * (1.914_602 - t * (0.004_817 + t * 0.000_014))
         + (2.0 * mean_anomaly).sin() * (0.019_993 - t * 0.000_101)
