@@ -168,3 +168,17 @@ fn a_missing_scene_file_is_named() {
     let message = load(Path::new("no/such.toml"), &[]).unwrap_err().to_string();
     assert!(message.starts_with("no/such.toml: cannot be read: "), "{message}");
 }
+
+#[test]
+fn the_scenes_of_the_repository_are_valid() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut count = 0;
+    for entry in std::fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+            count += 1;
+        }
+    }
+    assert!(count >= 7, "{count} scenes");
+}
