@@ -1,11 +1,18 @@
 //! Volumetric cumulus skies in raw Vulkan.
 
 pub mod error;
+pub mod gpu;
 #[cfg(feature = "files")]
 pub mod output;
 pub mod params;
 #[cfg(feature = "files")]
 pub mod scene;
+pub mod shared;
+
+/// Every shader program, as compiled and reflected by the build.
+pub mod shaders {
+    include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+}
 
 pub use error::{Error, Result};
 pub use params::Params;

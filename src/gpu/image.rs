@@ -1,0 +1,206 @@
+//! Images and samplers. Every image that Welkin owns stays in `GENERAL` layout for its whole life; only images that an
+//! engine lends have others (see [`Access`](super::Access)).
+
+use super::memory::{Allocation, MemoryLocation};
+use super::{Gpu, device::next_id};
+use crate::Result;
+use ash::vk;
+use std::sync::Arc;
+
+/// What an image is.
+#[derive(Clone, Copy, Debug)]
+pub struct ImageDesc<'a> {
+    /// Name, as debuggers show it.
+    pub name: &'a str,
+    /// Width, height and depth [texels]; a depth of 0 makes a 2D image, anything else a 3D image.
+    pub extent: [u32; 3],
+    /// Format of a texel.
+    pub format: vk::Format,
+    /// What it is used for. Transfers are always included.
+    pub usage: vk::ImageUsageFlags,
+}
+
+/// An image with one view, freed when dropped. The device must be done with it by then.
+pub struct Image {
+    gpu: Arc<Gpu>,
+    pub(crate) id: u64,
+    name: String,
+    handle: vk::Image,
+    view: vk::ImageView,
+    extent: [u32; 3],
+    format: vk::Format,
+    allocation: Option<Allocation>,
+    owned: bool,
+}
+
+impl Image {
+    /// A 2D or 3D image with one mip level and one layer.
+    pub fn new(gpu: &Arc<Gpu>, desc: &ImageDesc<'_>) -> Result<Self> {
+        let [width, height, depth] = desc.extent;
+        let volume = depth > 0;
+        let info = vk::ImageCreateInfo::default()
+            .image_type(if volume { vk::ImageType::TYPE_3D } else { vk::ImageType::TYPE_2D })
+            .format(desc.format)
+            .extent(vk::Extent3D { width, height, depth: depth.max(1) })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(desc.usage | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST);
+        // SAFETY: the device is alive as long as `gpu`, and the description is complete.
+        let handle = unsafe { gpu.device().create_image(&info, None) }
+            .map_err(|result| gpu.error("vkCreateImage", desc.name, result))?;
+        let mut image = Self {
+            gpu: gpu.clone(),
+            id: next_id(),
+            name: desc.name.to_owned(),
+            handle,
+            view: vk::ImageView::null(),
+            extent: [width, height, depth.max(1)],
+            format: desc.format,
+            allocation: None,
+            owned: true,
+        };
+        // SAFETY: the image was created above on this device.
+        let requirements = unsafe { gpu.device().get_image_memory_requirements(handle) };
+        let allocation = gpu.memory().allocate(desc.name, requirements, MemoryLocation::Device, false)?;
+        // SAFETY: the memory satisfies the requirements of this image, which is not bound yet.
+        let bound = unsafe { gpu.device().bind_image_memory(handle, allocation.memory, allocation.offset) };
+        image.allocation = Some(allocation);
+        bound.map_err(|result| gpu.error("vkBindImageMemory", desc.name, result))?;
+        let info = vk::ImageViewCreateInfo::default()
+            .image(handle)
+            .view_type(if volume { vk::ImageViewType::TYPE_3D } else { vk::ImageViewType::TYPE_2D })
+            .format(desc.format)
+            .subresource_range(COLOR);
+        // SAFETY: the image is bound to memory and the range is the whole image.
+        image.view = unsafe { gpu.device().create_image_view(&info, None) }
+            .map_err(|result| gpu.error("vkCreateImageView", desc.name, result))?;
+        gpu.set_name(handle, desc.name);
+        gpu.set_name(image.view, desc.name);
+        Ok(image)
+    }
+
+    /// Wraps an image that the host lends; nothing is destroyed on drop.
+    ///
+    /// # Safety
+    /// `handle` and `view` must stay valid, and of this extent and format, while the returned image is used.
+    pub unsafe fn borrow(
+        gpu: &Arc<Gpu>,
+        name: &str,
+        handle: vk::Image,
+        view: vk::ImageView,
+        extent: [u32; 2],
+        format: vk::Format,
+    ) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            id: next_id(),
+            name: name.to_owned(),
+            handle,
+            view,
+            extent: [extent[0], extent[1], 1],
+            format,
+            allocation: None,
+            owned: false,
+        }
+    }
+
+    /// The Vulkan handle.
+    pub fn handle(&self) -> vk::Image {
+        self.handle
+    }
+
+    /// A view of the whole image.
+    pub fn view(&self) -> vk::ImageView {
+        self.view
+    }
+
+    /// Width, height and depth [texels].
+    pub fn extent(&self) -> [u32; 3] {
+        self.extent
+    }
+
+    /// Format of a texel.
+    pub fn format(&self) -> vk::Format {
+        self.format
+    }
+
+    /// Name, as debuggers show it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// This image as read through `sampler`.
+    pub fn sampled(&self, sampler: Sampler) -> Sampled<'_> {
+        Sampled { image: self, sampler }
+    }
+}
+
+impl Drop for Image {
+    fn drop(&mut self) {
+        if !self.owned {
+            return;
+        }
+        // SAFETY: the caller has made sure that the device is done with the image (see the type's documentation).
+        unsafe {
+            self.gpu.device().destroy_image_view(self.view, None);
+            self.gpu.device().destroy_image(self.handle, None);
+        }
+        if let Some(allocation) = self.allocation.take() {
+            self.gpu.memory().free(allocation);
+        }
+    }
+}
+
+/// The whole of a colour image with one level and one layer.
+pub(crate) const COLOR: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    base_mip_level: 0,
+    level_count: 1,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+
+/// The samplers that Welkin uses.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Sampler {
+    /// Nearest texel, clamped.
+    NearestClamp,
+    /// (Tri)linear, clamped.
+    LinearClamp,
+    /// (Tri)linear, repeating in every direction.
+    LinearRepeat,
+    /// Trilinear, repeating in x and z, clamped in y: the optical depth table, whose azimuths wrap.
+    LinearRepeatClampRepeat,
+}
+
+impl Sampler {
+    pub(crate) const ALL: [Self; 4] =
+        [Self::NearestClamp, Self::LinearClamp, Self::LinearRepeat, Self::LinearRepeatClampRepeat];
+
+    pub(crate) fn info(self) -> vk::SamplerCreateInfo<'static> {
+        let filter = if self == Self::NearestClamp { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+        let (clamp, repeat) = (vk::SamplerAddressMode::CLAMP_TO_EDGE, vk::SamplerAddressMode::REPEAT);
+        let [u, v, w] = match self {
+            Self::NearestClamp | Self::LinearClamp => [clamp; 3],
+            Self::LinearRepeat => [repeat; 3],
+            Self::LinearRepeatClampRepeat => [repeat, clamp, repeat],
+        };
+        vk::SamplerCreateInfo::default()
+            .mag_filter(filter)
+            .min_filter(filter)
+            .address_mode_u(u)
+            .address_mode_v(v)
+            .address_mode_w(w)
+    }
+}
+
+/// An image and the sampler that reads it.
+#[derive(Clone, Copy)]
+pub struct Sampled<'a> {
+    /// The image.
+    pub image: &'a Image,
+    /// How it is filtered and wrapped.
+    pub sampler: Sampler,
+}

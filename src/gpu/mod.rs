@@ -1,0 +1,33 @@
+//! The thin layer between the passes and Vulkan: borrowed handles, resources with a name and a lifetime, pipelines
+//! described as data, and a recorder that derives every barrier from what the shaders declare.
+//!
+//! Nothing here owns a device except [`standalone`], which the command line, the tests and the examples use. An engine
+//! hands over its own through [`Gpu::from_raw`].
+
+mod access;
+mod buffer;
+mod capabilities;
+mod device;
+mod frames;
+mod image;
+mod memory;
+mod pipeline;
+mod program;
+mod recorder;
+pub mod standalone;
+mod timing;
+
+pub use access::Access;
+pub use buffer::{Buffer, BufferKind};
+pub use capabilities::{Capabilities, FEATURES_WANTED, Feature};
+pub use device::{Gpu, RawDevice};
+pub use frames::Frames;
+pub use image::{Image, ImageDesc, Sampled, Sampler};
+pub use memory::{Allocation, Allocator, MemoryLocation, MemoryUse};
+pub use pipeline::{
+    Attachment, BlendState, ComputePipeline, DefaultFactory, GraphicsPipeline, GraphicsState, PipelineDesc,
+    PipelineFactory, PipelineKind,
+};
+pub use program::{Binding, BindingKind, BindingSet, Program, Resource, ShaderStage, SpecConstant, Stage};
+pub use recorder::{Draw, Recorder, RecorderState, Target};
+pub use timing::PassTime;

@@ -1,0 +1,546 @@
+//! Records passes into a command buffer. Every use of a resource goes through here, so the barriers between uses follow
+//! from what the shaders declare; the order of passes is the order of calls.
+
+use super::access::{Barrier, ResourceState};
+use super::image::COLOR;
+use super::pipeline::{Pipeline, check_bindings};
+use super::timing::Timer;
+use super::{
+    Access, BindingSet, Buffer, ComputePipeline, Gpu, GraphicsPipeline, Image, PassTime, Program, Resource, ShaderStage,
+};
+use crate::{Error, Result};
+use ash::vk;
+use bytemuck::Pod;
+use std::collections::{HashMap, HashSet};
+use std::ffi::CString;
+use std::sync::Arc;
+
+/// What has to be remembered between frames: the last access of each resource, descriptor sets, timers.
+pub struct RecorderState {
+    gpu: Arc<Gpu>,
+    resources: HashMap<u64, ResourceState>,
+    initialised: HashSet<u64>,
+    sets: HashMap<SetKey, vk::DescriptorSet>,
+    pools: Vec<vk::DescriptorPool>,
+    timers: Vec<Timer>,
+    log: Option<Vec<String>>,
+}
+
+/// Program, then identity and sampler of each resource.
+type SetKey = (usize, Vec<(u64, u8)>);
+
+const SETS_PER_POOL: u32 = 64;
+
+impl RecorderState {
+    /// State for `slots` frames in flight.
+    pub fn new(gpu: &Arc<Gpu>, slots: usize) -> Result<Self> {
+        Ok(Self {
+            gpu: gpu.clone(),
+            resources: HashMap::new(),
+            initialised: HashSet::new(),
+            sets: HashMap::new(),
+            pools: Vec::new(),
+            timers: (0..slots).map(|_| Timer::new(gpu)).collect::<Result<_>>()?,
+            log: None,
+        })
+    }
+
+    /// Starts recording frame slot `slot` into `cmd`.
+    ///
+    /// # Safety
+    /// `cmd` is in the recording state, outside a render pass, and is submitted to a queue of the device's family before
+    /// any later recording of this state; the last frame of this slot has ended on the device.
+    pub unsafe fn begin(&mut self, cmd: vk::CommandBuffer, slot: usize) -> Recorder<'_> {
+        self.timers[slot].reset(cmd);
+        Recorder { state: self, cmd, slot, pass: "" }
+    }
+
+    /// Time of each pass of the last frame in `slot`, which must have ended; empty without timestamps.
+    pub fn times(&self, slot: usize) -> Vec<PassTime> {
+        self.timers[slot].read()
+    }
+
+    /// The last pass that the device had begun in `slot`: where to look when the device was lost.
+    pub fn last_pass(&self, slot: usize) -> &'static str {
+        self.timers[slot].last_pass()
+    }
+
+    /// Forgets descriptor sets and states, after resources have been replaced. The device must be idle.
+    pub fn forget(&mut self) {
+        self.sets.clear();
+        self.resources.clear();
+        for pool in self.pools.drain(..) {
+            // SAFETY: the device is idle, so no set of the pool is in use.
+            unsafe { self.gpu.device().destroy_descriptor_pool(pool, None) };
+        }
+    }
+
+    /// From now on keeps a line of text for each command and each barrier, for tests and for people.
+    pub fn start_log(&mut self) {
+        self.log = Some(Vec::new());
+    }
+
+    /// What [`start_log`](Self::start_log) has collected.
+    pub fn take_log(&mut self) -> Vec<String> {
+        self.log.take().unwrap_or_default()
+    }
+
+    fn descriptor_set(&mut self, pipeline: &Pipeline, resources: &[Resource<'_>]) -> Result<vk::DescriptorSet> {
+        let program = pipeline.desc.program;
+        let key: SetKey = (
+            std::ptr::from_ref(program).addr(),
+            resources
+                .iter()
+                .map(|resource| match resource {
+                    Resource::Buffer(buffer) => (buffer.id, 0),
+                    Resource::Image(image) => (image.id, 0),
+                    Resource::Sampled(sampled) => (sampled.image.id, 1 + sampled.sampler as u8),
+                })
+                .collect(),
+        );
+        if let Some(set) = self.sets.get(&key) {
+            return Ok(*set);
+        }
+        let set = self.allocate_set(pipeline)?;
+        write_set(&self.gpu, set, program, resources);
+        self.sets.insert(key, set);
+        Ok(set)
+    }
+
+    fn allocate_set(&mut self, pipeline: &Pipeline) -> Result<vk::DescriptorSet> {
+        let layouts = [pipeline.set_layout];
+        if let Some(pool) = self.pools.last() {
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
+            // SAFETY: pool and layout belong to this device.
+            if let Ok(sets) = unsafe { self.gpu.device().allocate_descriptor_sets(&info) } {
+                return Ok(sets[0]);
+            }
+        }
+        let size = |ty, count| vk::DescriptorPoolSize { ty, descriptor_count: count * SETS_PER_POOL };
+        let sizes = [
+            size(vk::DescriptorType::STORAGE_BUFFER, 10),
+            size(vk::DescriptorType::STORAGE_IMAGE, 4),
+            size(vk::DescriptorType::COMBINED_IMAGE_SAMPLER, 6),
+            size(vk::DescriptorType::INPUT_ATTACHMENT, 2),
+        ];
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
+        // SAFETY: the device is alive as long as `gpu`.
+        let pool = unsafe { self.gpu.device().create_descriptor_pool(&info, None) }
+            .map_err(|result| self.gpu.error("vkCreateDescriptorPool", "descriptor sets", result))?;
+        self.pools.push(pool);
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+        // SAFETY: as above.
+        unsafe { self.gpu.device().allocate_descriptor_sets(&info) }
+            .map(|sets| sets[0])
+            .map_err(|result| self.gpu.error("vkAllocateDescriptorSets", pipeline.desc.program.name, result))
+    }
+}
+
+impl Drop for RecorderState {
+    fn drop(&mut self) {
+        self.forget();
+    }
+}
+
+fn write_set(gpu: &Gpu, set: vk::DescriptorSet, program: &Program, resources: &[Resource<'_>]) {
+    enum Info {
+        Buffer([vk::DescriptorBufferInfo; 1]),
+        Image([vk::DescriptorImageInfo; 1]),
+    }
+    let image = |image: &Image, sampler| {
+        Info::Image([vk::DescriptorImageInfo {
+            sampler,
+            image_view: image.view(),
+            image_layout: vk::ImageLayout::GENERAL,
+        }])
+    };
+    let infos: Vec<Info> = resources
+        .iter()
+        .map(|resource| match resource {
+            Resource::Buffer(buffer) => {
+                Info::Buffer([vk::DescriptorBufferInfo { buffer: buffer.handle(), offset: 0, range: vk::WHOLE_SIZE }])
+            }
+            Resource::Image(i) => image(i, vk::Sampler::null()),
+            Resource::Sampled(s) => image(s.image, gpu.sampler(s.sampler)),
+        })
+        .collect();
+    let writes: Vec<_> = program
+        .bindings
+        .iter()
+        .zip(&infos)
+        .map(|(binding, info)| {
+            let write = vk::WriteDescriptorSet::default()
+                .dst_set(set)
+                .dst_binding(binding.binding)
+                .descriptor_type(binding.kind.descriptor_type());
+            match info {
+                Info::Buffer(info) => write.buffer_info(info),
+                Info::Image(info) => write.image_info(info),
+            }
+        })
+        .collect();
+    // SAFETY: the set is new, so no command uses it; resources outlive the commands that do (see `Buffer`, `Image`).
+    unsafe { gpu.device().update_descriptor_sets(&writes, &[]) };
+}
+
+/// A colour attachment of a draw.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    /// The image.
+    pub image: &'a Image,
+    /// Value that it is cleared to first; none keeps what is there.
+    pub clear: Option<[f32; 4]>,
+}
+
+/// How many vertices and instances to draw.
+#[derive(Clone, Copy)]
+pub enum Draw<'a> {
+    /// Known to the host.
+    Direct {
+        /// Vertices of each instance.
+        vertices: u32,
+        /// Instances.
+        instances: u32,
+    },
+    /// A `VkDrawIndirectCommand` in a buffer.
+    Indirect {
+        /// The buffer.
+        args: &'a Buffer,
+        /// Where in it the command lies [bytes].
+        offset: u64,
+    },
+}
+
+/// An open command buffer.
+pub struct Recorder<'s> {
+    state: &'s mut RecorderState,
+    cmd: vk::CommandBuffer,
+    slot: usize,
+    pass: &'static str,
+}
+
+impl Recorder<'_> {
+    /// The device that is recorded for.
+    pub fn gpu(&self) -> &Arc<Gpu> {
+        &self.state.gpu
+    }
+
+    /// The command buffer, for commands of the host's own.
+    pub fn command_buffer(&self) -> vk::CommandBuffer {
+        self.cmd
+    }
+
+    /// The frame slot being recorded.
+    pub fn slot(&self) -> usize {
+        self.slot
+    }
+
+    /// Opens a labelled, timed pass around `record`.
+    pub fn pass<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        let outer = std::mem::replace(&mut self.pass, name);
+        self.log(|| format!("pass {name}"));
+        self.label(name);
+        let index = self.state.timers[self.slot].begin(self.cmd, name);
+        let result = record(self);
+        self.state.timers[self.slot].end(self.cmd, index);
+        if let Some(debug) = self.state.gpu.debug() {
+            // SAFETY: closes the label that was opened above.
+            unsafe { debug.cmd_end_debug_utils_label(self.cmd) };
+        }
+        self.pass = outer;
+        result
+    }
+
+    fn label(&self, name: &str) {
+        if let (Some(debug), Ok(name)) = (self.state.gpu.debug(), CString::new(name)) {
+            let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+            // SAFETY: the command buffer is recording.
+            unsafe { debug.cmd_begin_debug_utils_label(self.cmd, &label) };
+        }
+    }
+
+    /// Runs at least `threads` invocations of `pipeline`, rounded up to whole groups.
+    pub fn dispatch<P: Pod>(
+        &mut self,
+        pipeline: &ComputePipeline,
+        bindings: &dyn BindingSet,
+        push: &P,
+        threads: [u32; 3],
+    ) -> Result<()> {
+        let group = pipeline.0.desc.program.group_size;
+        self.bind(&pipeline.0, bindings, push, vk::PipelineBindPoint::COMPUTE, &[])?;
+        let [x, y, z] = [0, 1, 2].map(|i| threads[i].div_ceil(group[i]));
+        // SAFETY: pipeline and descriptors are bound, barriers recorded.
+        unsafe { self.state.gpu.device().cmd_dispatch(self.cmd, x, y, z) };
+        Ok(())
+    }
+
+    /// Runs as many groups of `pipeline` as the `VkDispatchIndirectCommand` at `offset` of `args` says.
+    pub fn dispatch_indirect<P: Pod>(
+        &mut self,
+        pipeline: &ComputePipeline,
+        bindings: &dyn BindingSet,
+        push: &P,
+        args: &Buffer,
+        offset: u64,
+    ) -> Result<()> {
+        self.bind(&pipeline.0, bindings, push, vk::PipelineBindPoint::COMPUTE, &[(args.id, Access::IndirectRead)])?;
+        // SAFETY: as above; the argument buffer holds a command at `offset`.
+        unsafe { self.state.gpu.device().cmd_dispatch_indirect(self.cmd, args.handle(), offset) };
+        Ok(())
+    }
+
+    /// Draws into `targets` (none is allowed), over the whole of `extent`.
+    pub fn draw<P: Pod>(
+        &mut self,
+        pipeline: &GraphicsPipeline,
+        bindings: &dyn BindingSet,
+        push: &P,
+        extent: [u32; 2],
+        targets: &[Target<'_>],
+        draw: Draw<'_>,
+    ) -> Result<()> {
+        let mut extra: Vec<(u64, Access)> = Vec::new();
+        for target in targets {
+            self.initialise(target.image);
+            extra.push((target.image.id, Access::ColorAttachment));
+        }
+        if let Draw::Indirect { args, .. } = draw {
+            extra.push((args.id, Access::IndirectRead));
+        }
+        self.bind(&pipeline.0, bindings, push, vk::PipelineBindPoint::GRAPHICS, &extra)?;
+        let attachments: Vec<_> = targets
+            .iter()
+            .map(|target| {
+                let attachment = vk::RenderingAttachmentInfo::default()
+                    .image_view(target.image.view())
+                    .image_layout(vk::ImageLayout::GENERAL)
+                    .store_op(vk::AttachmentStoreOp::STORE);
+                match target.clear {
+                    None => attachment.load_op(vk::AttachmentLoadOp::LOAD),
+                    Some(float32) => attachment
+                        .load_op(vk::AttachmentLoadOp::CLEAR)
+                        .clear_value(vk::ClearValue { color: vk::ClearColorValue { float32 } }),
+                }
+            })
+            .collect();
+        let [width, height] = extent;
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+        let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
+        let viewport =
+            vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
+        let device = self.state.gpu.device();
+        // SAFETY: pipeline and descriptors are bound, barriers recorded, attachments in GENERAL layout.
+        unsafe {
+            device.cmd_begin_rendering(self.cmd, &rendering);
+            device.cmd_set_viewport(self.cmd, 0, &[viewport]);
+            device.cmd_set_scissor(self.cmd, 0, &[area]);
+            match draw {
+                Draw::Direct { vertices, instances } => device.cmd_draw(self.cmd, vertices, instances, 0, 0),
+                Draw::Indirect { args, offset } => device.cmd_draw_indirect(self.cmd, args.handle(), offset, 1, 16),
+            }
+            device.cmd_end_rendering(self.cmd);
+        }
+        Ok(())
+    }
+
+    /// Fills `size` bytes from `offset` with a word.
+    pub fn fill_buffer(&mut self, buffer: &Buffer, offset: u64, size: u64, word: u32) {
+        self.transition("fill", &[(buffer.id, Access::TransferWrite)]);
+        // SAFETY: the range lies inside the buffer (validation checks it), barriers are recorded.
+        unsafe { self.state.gpu.device().cmd_fill_buffer(self.cmd, buffer.handle(), offset, size, word) };
+    }
+
+    /// Copies `size` bytes from the start of one buffer to the start of another.
+    pub fn copy_buffer(&mut self, from: &Buffer, to: &Buffer, size: u64) {
+        self.transition("copy", &[(from.id, Access::TransferRead), (to.id, Access::TransferWrite)]);
+        let region = vk::BufferCopy { src_offset: 0, dst_offset: 0, size };
+        // SAFETY: as above.
+        unsafe { self.state.gpu.device().cmd_copy_buffer(self.cmd, from.handle(), to.handle(), &[region]) };
+    }
+
+    /// Copies a whole image to the start of a buffer, rows tightly packed.
+    pub fn copy_image_to_buffer(&mut self, from: &Image, to: &Buffer) {
+        self.initialise(from);
+        self.transition("copy", &[(from.id, Access::TransferRead), (to.id, Access::TransferWrite)]);
+        let device = self.state.gpu.device();
+        // SAFETY: the image is in GENERAL layout; the buffer is large enough (validation checks it).
+        unsafe {
+            let (general, region) = (vk::ImageLayout::GENERAL, region(from));
+            device.cmd_copy_image_to_buffer(self.cmd, from.handle(), general, to.handle(), &[region]);
+        }
+    }
+
+    /// Copies the start of a buffer, rows tightly packed, to a whole image.
+    pub fn copy_buffer_to_image(&mut self, from: &Buffer, to: &Image) {
+        self.initialise(to);
+        self.transition("copy", &[(from.id, Access::TransferRead), (to.id, Access::TransferWrite)]);
+        let device = self.state.gpu.device();
+        // SAFETY: as above.
+        unsafe {
+            let (general, region) = (vk::ImageLayout::GENERAL, region(to));
+            device.cmd_copy_buffer_to_image(self.cmd, from.handle(), to.handle(), general, &[region]);
+        }
+    }
+
+    /// Clears a whole colour image.
+    pub fn clear_image(&mut self, image: &Image, float32: [f32; 4]) {
+        self.initialise(image);
+        self.transition("clear", &[(image.id, Access::TransferWrite)]);
+        let value = vk::ClearColorValue { float32 };
+        let device = self.state.gpu.device();
+        // SAFETY: the image is in GENERAL layout.
+        unsafe { device.cmd_clear_color_image(self.cmd, image.handle(), vk::ImageLayout::GENERAL, &value, &[COLOR]) };
+    }
+
+    /// Makes what the device has written to a readback buffer visible to the host once the submission has ended.
+    pub fn make_visible_to_host(&mut self, buffer: &Buffer) {
+        self.transition("host", &[(buffer.id, Access::HostRead)]);
+    }
+
+    /// Takes over a lent image that was last used as `access` in `layout`; its contents are kept unless the layout is
+    /// `UNDEFINED`.
+    pub fn acquire(&mut self, image: &Image, access: Access, layout: vk::ImageLayout) {
+        let (src_stage, src_access) = access.masks();
+        self.layout(image, (src_stage, src_access), ALL, layout, vk::ImageLayout::GENERAL);
+        self.state.initialised.insert(image.id);
+        self.state.resources.insert(image.id, ResourceState::default());
+    }
+
+    /// Gives a lent image back, ready for `access` in `layout`.
+    pub fn release(&mut self, image: &Image, access: Access, layout: vk::ImageLayout) {
+        self.layout(image, ALL, access.masks(), vk::ImageLayout::GENERAL, layout);
+        self.state.initialised.remove(&image.id);
+        self.state.resources.remove(&image.id);
+    }
+
+    fn bind<P: Pod>(
+        &mut self,
+        pipeline: &Pipeline,
+        bindings: &dyn BindingSet,
+        push: &P,
+        point: vk::PipelineBindPoint,
+        extra: &[(u64, Access)],
+    ) -> Result<()> {
+        check_bindings(pipeline, bindings);
+        let program = pipeline.desc.program;
+        let resources = bindings.resources();
+        let compute = program.stages[0].kind == ShaderStage::Compute;
+        let mut uses = extra.to_vec();
+        for (binding, resource) in program.bindings.iter().zip(&resources) {
+            let access = match (compute, binding.readable, binding.writable) {
+                (true, true, true) => Access::ComputeReadWrite,
+                (true, false, true) => Access::ComputeWrite,
+                (true, _, false) => Access::ComputeRead,
+                (false, true, true) => Access::FragmentReadWrite,
+                (false, false, true) => Access::FragmentWrite,
+                (false, _, false) => Access::GraphicsRead,
+            };
+            let id = match resource {
+                Resource::Buffer(buffer) => buffer.id,
+                Resource::Image(image) | Resource::Sampled(super::Sampled { image, .. }) => {
+                    self.initialise(image);
+                    image.id
+                }
+            };
+            uses.push((id, access));
+        }
+        let set = self.state.descriptor_set(pipeline, &resources)?;
+        self.transition(program.name, &uses);
+        let bytes = bytemuck::bytes_of(push);
+        let size = program.push_constant_size as usize;
+        assert!(bytes.len() >= size, "{}: {} bytes of push constants, expected {size}", program.name, bytes.len());
+        let device = self.state.gpu.device();
+        // SAFETY: pipeline, layout and set belong together; the set's resources outlive the commands.
+        unsafe {
+            device.cmd_bind_pipeline(self.cmd, point, pipeline.handle);
+            device.cmd_bind_descriptor_sets(self.cmd, point, pipeline.layout, 0, &[set], &[]);
+            if size > 0 {
+                device.cmd_push_constants(self.cmd, pipeline.layout, pipeline.stages, 0, &bytes[..size]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Records the one barrier that must come before a command with these uses.
+    fn transition(&mut self, command: &str, uses: &[(u64, Access)]) {
+        let mut barrier = Barrier::default();
+        // One resource may be used in two ways by one command; a write must see all earlier reads, so reads go first.
+        for writes in [false, true] {
+            for (id, access) in uses.iter().filter(|(_, access)| access.writes() == writes) {
+                self.state.resources.entry(*id).or_default().apply(*access, &mut barrier);
+            }
+        }
+        if !barrier.is_empty() {
+            self.log(|| format!("  barrier {:?} -> {:?}", barrier.src, barrier.dst));
+            let memory = [vk::MemoryBarrier2::default()
+                .src_stage_mask(barrier.src.0)
+                .src_access_mask(barrier.src.1)
+                .dst_stage_mask(barrier.dst.0)
+                .dst_access_mask(barrier.dst.1)];
+            let dependency = vk::DependencyInfo::default().memory_barriers(&memory);
+            // SAFETY: the command buffer is recording, outside a render pass.
+            unsafe { self.state.gpu.device().cmd_pipeline_barrier2(self.cmd, &dependency) };
+        }
+        self.log(|| format!("  {command}"));
+    }
+
+    /// Brings a new image to GENERAL layout, once in its life.
+    fn initialise(&mut self, image: &Image) {
+        if self.state.initialised.insert(image.id) {
+            let none = Access::None.masks();
+            self.layout(image, none, ALL, vk::ImageLayout::UNDEFINED, vk::ImageLayout::GENERAL);
+        }
+    }
+
+    fn layout(
+        &mut self,
+        image: &Image,
+        src: (vk::PipelineStageFlags2, vk::AccessFlags2),
+        dst: (vk::PipelineStageFlags2, vk::AccessFlags2),
+        old: vk::ImageLayout,
+        new: vk::ImageLayout,
+    ) {
+        let barriers = [vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(src.0)
+            .src_access_mask(src.1)
+            .dst_stage_mask(dst.0)
+            .dst_access_mask(dst.1)
+            .old_layout(old)
+            .new_layout(new)
+            .image(image.handle())
+            .subresource_range(COLOR)];
+        let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        // SAFETY: the command buffer is recording, outside a render pass; the image is alive.
+        unsafe { self.state.gpu.device().cmd_pipeline_barrier2(self.cmd, &dependency) };
+    }
+
+    fn log(&mut self, line: impl FnOnce() -> String) {
+        if let Some(log) = &mut self.state.log {
+            log.push(line());
+        }
+    }
+
+    /// The error of a lost device, naming the last pass reached.
+    pub fn device_lost(&self) -> Error {
+        Error::DeviceLost { last_pass: self.state.last_pass(self.slot).to_owned() }
+    }
+}
+
+/// Every stage, every access: for the rare layout changes, which happen once in an image's life or at the border to a host.
+const ALL: (vk::PipelineStageFlags2, vk::AccessFlags2) = (
+    vk::PipelineStageFlags2::ALL_COMMANDS,
+    vk::AccessFlags2::from_raw(vk::AccessFlags2::MEMORY_READ.as_raw() | vk::AccessFlags2::MEMORY_WRITE.as_raw()),
+);
+
+fn region(image: &Image) -> vk::BufferImageCopy {
+    let [width, height, depth] = image.extent();
+    vk::BufferImageCopy::default()
+        .image_subresource(vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        })
+        .image_extent(vk::Extent3D { width, height, depth })
+}
