@@ -1,5 +1,7 @@
 //! Volumetric cumulus skies in raw Vulkan.
 
+#![deny(clippy::unwrap_used, clippy::expect_used)] // Tests and examples may.
+
 pub mod error;
 pub mod gpu;
 #[cfg(feature = "files")]
