@@ -2,4 +2,8 @@
 
 #![deny(clippy::unwrap_used, clippy::expect_used)] // Tests and examples may.
 
-fn main() {}
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

@@ -1,0 +1,114 @@
+//! `welkin devices`: what there is, and what each device can do.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+use welkin::Result;
+use welkin::gpu::{Capabilities, Feature, standalone};
+use welkin::params::{BLENDS, Blend};
+
+use super::args::DevicesArgs;
+
+#[derive(Serialize)]
+struct Report {
+    devices: Vec<Device>,
+}
+
+#[derive(Serialize)]
+struct Device {
+    index: usize,
+    name: String,
+    /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
+    kind: &'static str,
+    driver: String,
+    api: String,
+    usable: bool,
+    /// What keeps Welkin from running on it.
+    missing: Vec<String>,
+    /// The mode that `auto` takes; none on a device that cannot be used.
+    auto: Option<&'static str>,
+    blend: Vec<Mode>,
+    timestamps: Answer,
+}
+
+#[derive(Serialize)]
+struct Mode {
+    mode: &'static str,
+    #[serde(flatten)]
+    answer: Answer,
+}
+
+#[derive(Serialize, Clone)]
+struct Answer {
+    supported: bool,
+    /// Why not; null where it is supported.
+    reason: Option<String>,
+}
+
+impl From<Result<(), String>> for Answer {
+    fn from(answer: Result<(), String>) -> Self {
+        Self { supported: answer.is_ok(), reason: answer.err() }
+    }
+}
+
+pub fn run(args: &DevicesArgs) -> Result<()> {
+    let devices = standalone::devices()?;
+    let report =
+        Report { devices: devices.iter().enumerate().map(|(index, device)| describe(index, device)).collect() };
+    if args.json { super::print_json(&report) } else { super::print(&text(&report)) }
+}
+
+fn describe(index: usize, device: &Capabilities) -> Device {
+    let modes = BLENDS.iter().filter(|row| row.value != Blend::Auto);
+    let blend: Vec<_> =
+        modes.map(|row| Mode { mode: row.name, answer: supports(device, row.value, row.here).into() }).collect();
+    Device {
+        index,
+        name: device.device_name.clone(),
+        kind: device.device_type,
+        driver: device.driver.clone(),
+        api: device.api.clone(),
+        usable: device.missing.is_empty(),
+        missing: device.missing.clone(),
+        // The table lists the modes with the best first.
+        auto: blend.iter().find(|mode| mode.answer.supported).map(|mode| mode.mode),
+        blend,
+        timestamps: device.supports(Feature::Timestamps).map_err(str::to_owned).into(),
+    }
+}
+
+/// Whether `device` can composite by `blend`, or why not.
+fn supports(device: &Capabilities, blend: Blend, here: bool) -> Result<(), String> {
+    if !device.missing.is_empty() {
+        return Err(format!("the device lacks {}", device.missing.join(", ")));
+    }
+    if !here {
+        return Err("not in this version of Welkin yet".into());
+    }
+    match blend {
+        Blend::Interlock(_) => device.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
+        _ => Ok(()),
+    }
+}
+
+fn text(report: &Report) -> String {
+    let mut text = String::new();
+    if report.devices.is_empty() {
+        text.push_str("no Vulkan device\n");
+    }
+    for device in &report.devices {
+        let Device { index, name, kind, driver, api, .. } = device;
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{index}: {name} ({kind}, Vulkan {api}, {driver})");
+        for Mode { mode, answer } in &device.blend {
+            let _ = writeln!(text, "   {mode:<12} {}", answer_text(answer));
+        }
+        let _ = writeln!(text, "   {:<12} {}", "auto", device.auto.map_or("none", |mode| mode));
+        let _ = writeln!(text, "   {:<12} {}", "timestamps", answer_text(&device.timestamps));
+    }
+    text
+}
+
+fn answer_text(answer: &Answer) -> String {
+    answer.reason.as_ref().map_or("yes".into(), |reason| format!("no: {reason}"))
+}

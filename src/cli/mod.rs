@@ -1,0 +1,42 @@
+//! The command line: a thin shell around the library.
+
+mod args;
+mod devices;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use args::{Cli, Command};
+use clap::Parser;
+use welkin::{Error, Result};
+
+/// Parses the command line and runs it. Status 0: done; 2: error. (1 is for comparisons that fail; no command of this
+/// version makes one.)
+pub fn main() -> ExitCode {
+    let cli = Cli::parse(); // Ends the process with status 2 on a usage error, 0 on --help.
+    let outcome = match &cli.command {
+        Command::Devices(args) => devices::run(args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("welkin: error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Writes a result to standard output. A reader that has gone away (`welkin … | head`) is not an error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::file("standard output", format!("cannot be written: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// `value` as JSON on standard output.
+fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    print(&welkin::output::to_json(value).map_err(|reason| Error::file("standard output", reason))?)
+}
