@@ -79,6 +79,9 @@ impl<'a> Source<'a> {
             if what.starts_with("unknown field") {
                 return self.fault(&span, &field, None, &format!("a known key ({})", expected.replace('`', "")));
             }
+            if let Some(missing) = message.strip_prefix("missing field ") {
+                return self.fault(&span, &field, None, &format!("the key {}", missing.replace('`', "")));
+            }
             self.fault(&span, &field, self.text.get(span.clone()), in_words(expected))
         })
     }
