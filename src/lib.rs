@@ -2,11 +2,15 @@
 
 #![deny(clippy::unwrap_used, clippy::expect_used)] // Tests and examples may.
 
+pub mod compact;
+pub mod density;
 pub mod error;
 pub mod gpu;
+pub mod grid;
 #[cfg(feature = "files")]
 pub mod output;
 pub mod params;
+pub mod reference;
 #[cfg(feature = "files")]
 pub mod scene;
 pub mod shared;

@@ -1,0 +1,17 @@
+// Counts of one frame, copied to the host at its end. A list counts what it was asked to hold, also past its capacity,
+// so that the host reads the true need and grows the list before the next frame.
+#ifndef WELKIN_GRID_COUNTERS
+#define WELKIN_GRID_COUNTERS
+
+struct Counters {
+    uint cells;       // cells classified
+    uint valid_cells; // cells that hold cloud
+    uint generated;   // particles wanted
+    uint stored;      // particles that fit: min(generated, capacity)
+    uint visible;     // particles in the view frustum
+    uint tile_nodes;  // light list nodes wanted
+    uint longest_list; // nodes in the longest light list
+    uint truncated;   // receivers whose walk hit the traversal limit
+};
+
+#endif

@@ -1,0 +1,167 @@
+//! The coverage field (`glsl/density/field.glsl`), bit for bit.
+//!
+//! `f32` with one rounding per operation, in the shader's order: which cells hold cloud is an integer decision, and host
+//! and device must take the same.
+
+/// PCG-RXS-M-XS as a hash (O'Neill 2014).
+#[must_use]
+pub fn pcg(v: u32) -> u32 {
+    let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+/// Hash of a lattice point.
+#[must_use]
+pub fn hash_lattice(point: [i32; 2], seed: u32) -> u32 {
+    pcg((point[0] as u32).wrapping_add(pcg((point[1] as u32).wrapping_add(pcg(seed)))))
+}
+
+/// Uniform in [0, 1).
+#[must_use]
+pub fn unit_float(hash: u32) -> f32 {
+    (hash >> 8) as f32 * 5.960_464_5e-8
+}
+
+/// Uniform in [-1, 1).
+#[must_use]
+pub fn signed_float(hash: u32) -> f32 {
+    (hash >> 8) as f32 * 1.192_092_9e-7 - 1.0
+}
+
+/// Lattice cell and the place in it, 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LatticePoint {
+    /// Lattice cell (x, z).
+    pub cell: [i32; 2],
+    /// Fraction within the cell.
+    pub fraction: [f32; 2],
+}
+
+/// Splits position × frequency, a 64-bit product, into cell and fraction.
+#[must_use]
+pub fn lattice_point(position: [i32; 2], frequency: i32) -> LatticePoint {
+    let product = position.map(|axis| i64::from(axis) * i64::from(frequency));
+    LatticePoint { cell: product.map(|p| (p >> 32) as i32), fraction: product.map(|p| unit_float(p as u32)) }
+}
+
+fn quintic(f: f32) -> f32 {
+    let cube = (f * f) * f;
+    let slope = f * 6.0 - 15.0;
+    cube * (f * slope + 10.0)
+}
+
+fn lattice_gradient(corner: [i32; 2], x: f32, z: f32, seed: u32) -> f32 {
+    let hash = hash_lattice(corner, seed);
+    let gx = (hash & 0xffff) as f32 * 3.051_757_8e-5 - 1.0;
+    let gz = (hash >> 16) as f32 * 3.051_757_8e-5 - 1.0;
+    gx * x + gz * z
+}
+
+/// Gradient noise, zero mean, mostly within ±0.6.
+#[must_use]
+pub fn gradient_noise(p: LatticePoint, seed: u32) -> f32 {
+    let [x, z] = p.fraction;
+    let (x1, z1) = (x - 1.0, z - 1.0);
+    let corner = |dx: i32, dz: i32| [p.cell[0].wrapping_add(dx), p.cell[1].wrapping_add(dz)];
+    let a = lattice_gradient(corner(0, 0), x, z, seed);
+    let b = lattice_gradient(corner(1, 0), x1, z, seed);
+    let c = lattice_gradient(corner(0, 1), x, z1, seed);
+    let d = lattice_gradient(corner(1, 1), x1, z1, seed);
+    let (u, v) = (quintic(x), quintic(z));
+    let ab = a + u * (b - a);
+    let cd = c + u * (d - c);
+    ab + v * (cd - ab)
+}
+
+/// One round heap per lattice cell; the highest of the nine nearest, at least 0.
+#[must_use]
+pub fn heaps(p: LatticePoint, seed: u32) -> f32 {
+    let mut highest = 0.0f32;
+    for dz in -1..=1 {
+        for dx in -1..=1 {
+            let hash = hash_lattice([p.cell[0].wrapping_add(dx), p.cell[1].wrapping_add(dz)], seed);
+            let shape = pcg(hash);
+            let place_x = (hash & 0xffff) as f32 * 1.068_115_2e-5 + 0.15;
+            let place_z = (hash >> 16) as f32 * 1.068_115_2e-5 + 0.15;
+            let x = (dx as f32 - p.fraction[0]) + place_x;
+            let z = (dz as f32 - p.fraction[1]) + place_z;
+            let narrow = unit_float(shape);
+            let inverse_r2 = (narrow * narrow) * 2.6 + 0.85;
+            let height = 1.0 - narrow * 0.55;
+            let d2 = x * x + z * z;
+            highest = highest.max(height * (1.0 - d2 * inverse_r2));
+        }
+    }
+    highest
+}
+
+/// Frequencies of the field's noises, in 2⁻³² lattice cells per position step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FieldFrequencies {
+    /// Heaps.
+    pub heap: i32,
+    /// Outline; its two octaves double the frequency.
+    pub billow: i32,
+    /// Turrets on a heap.
+    pub turret: i32,
+    /// Clusters of heaps.
+    pub streak: i32,
+    /// Weather.
+    pub region: i32,
+}
+
+/// Positive far inside a cloud, lowest in clear sky.
+#[must_use]
+pub fn coverage_field(position: [i32; 2], f: FieldFrequencies, seed: u32) -> f32 {
+    let octave = |index: u32| seed.wrapping_add(index);
+    let heap = heaps(lattice_point(position, f.heap), seed);
+    let n1 = gradient_noise(lattice_point(position, f.billow), octave(1)) * 0.56;
+    let n2 = gradient_noise(lattice_point(position, f.billow * 2), octave(2)) * 0.34;
+    let n3 = gradient_noise(lattice_point(position, f.billow * 4), octave(3)) * 0.22;
+    let streak = gradient_noise(lattice_point(position, f.streak), octave(4)) + 0.75;
+    let region = gradient_noise(lattice_point(position, f.region), octave(5)) + 1.0;
+    let weather = (streak * region) * 0.55;
+    let outline = (n1 + n2) + n3;
+    (heap + outline) + weather
+}
+
+/// Height of the turrets that stand on a heap, 0 to 1.
+#[must_use]
+pub fn turret_field(position: [i32; 2], f: FieldFrequencies, seed: u32) -> f32 {
+    heaps(lattice_point(position, f.turret), seed.wrapping_add(6))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_scatters_neighbouring_inputs_over_all_bits() {
+        for bit in 0..32 {
+            let flips: u32 = (0..1024u32).map(|v| (pcg(v) ^ pcg(v ^ (1 << bit))).count_ones()).sum();
+            // 1024 × 32 fair coins: mean 16384, standard deviation 90; six of them.
+            assert!((15_844..=16_924).contains(&flips), "bit {bit}: {flips} flips");
+        }
+    }
+
+    #[test]
+    fn a_lattice_point_is_exact_far_from_the_origin_and_below_zero() {
+        let frequency = 1 << 20; // one lattice cell is 4096 steps
+        let p = lattice_point([-1, 4096 * 500_000 + 1024], frequency);
+        assert_eq!(p.cell, [-1, 500_000]);
+        assert_eq!(p.fraction, [4095.0 / 4096.0, 0.25]);
+    }
+
+    #[test]
+    fn the_field_is_continuous_across_lattice_borders() {
+        let f = FieldFrequencies { heap: 1 << 22, billow: 1 << 23, turret: 1 << 23, streak: 1 << 19, region: 1 << 16 };
+        let mut previous = coverage_field([-5000, 777], f, 3);
+        for x in -4999..5000 {
+            let value = coverage_field([x, 777], f, 3);
+            // The steepest slope: heaps 2·1.09·√(3.45)·(2⁻¹⁰ a step) and noise, below 0.02 a step of this size.
+            assert!((value - previous).abs() < 0.02, "jump of {} at {x}", value - previous);
+            previous = value;
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Cells and particles of the nested rings (`glsl/grid/`).
+//!
+//! Everything that decides whether, where in the list and how many particles there are is `f32` in the shader's order of
+//! operations, hence bit-equal. A particle's own floats agree to rounding: shaders may divide and normalise with a few
+//! units in the last place.
+
+use crate::grid::params::GridParams;
+use crate::reference::density::{
+    coverage_field, hash_lattice, lattice_point, pcg, signed_float, turret_field, unit_float,
+};
+use crate::shared::Particle;
+
+/// A cell's place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellPlace {
+    /// Ring.
+    pub ring: u32,
+    /// Index within the ring.
+    pub local: [i32; 2],
+    /// Lattice index in the world, for this ring's cell size.
+    pub absolute: [i32; 2],
+    /// Centre x, z [m, floating origin].
+    pub centre: [f32; 2],
+}
+
+/// The column of cloud on a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CellShape {
+    /// Particles; 0: no cloud.
+    pub layers: u32,
+    /// Height [m].
+    pub height: f32,
+    /// 0 at a cloud's outline, 1 well inside.
+    pub body: f32,
+    /// Cross-fade between levels of detail, 0 to 1.
+    pub weight: f32,
+}
+
+/// Where cell `cell_id` lies.
+#[must_use]
+pub fn cell_place(cell_id: u32, p: &GridParams) -> CellPlace {
+    let per_ring = p.ring_dim * p.ring_dim;
+    let (ring, within) = (cell_id / per_ring, cell_id % per_ring);
+    let local = [(within % p.ring_dim) as i32, (within / p.ring_dim) as i32];
+    let [x, z, edge, _] = p.ring_frame[ring as usize];
+    let first = p.ring_first[ring as usize];
+    CellPlace {
+        ring,
+        local,
+        absolute: [first[0] + local[0], first[1] + local[1]],
+        centre: [x + (local[0] as f32 + 0.5) * edge, z + (local[1] as f32 + 0.5) * edge],
+    }
+}
+
+fn smooth_unit(t: f32) -> f32 {
+    let c = t.clamp(0.0, 1.0);
+    (c * c) * (3.0 - c * 2.0)
+}
+
+fn ring_reach(centre: [f32; 2], ring: u32, p: &GridParams) -> f32 {
+    let (x, z) = (centre[0] - p.camera[0], centre[1] - p.camera[2]);
+    if ring + 1 == p.ring_count {
+        let relative = (x * x + z * z) * p.inverse_cutoff_squared;
+        return 1.0 - smooth_unit((relative - 0.8) * 6.25);
+    }
+    let cells = x.abs().max(z.abs()) * p.ring_frame[ring as usize][3];
+    let start = (p.ring_dim / 2) as f32 - 5.0;
+    1.0 - smooth_unit((cells - start) * 0.25)
+}
+
+/// Share of the cloud that ring `ring` shows at `centre`; the shares of all rings add up to 1 within the cut-off.
+#[must_use]
+pub fn ring_weight(centre: [f32; 2], ring: u32, p: &GridParams) -> f32 {
+    let reach = ring_reach(centre, ring, p);
+    if ring > 0 { reach * (1.0 - ring_reach(centre, ring - 1, p)) } else { reach }
+}
+
+/// Field value above which a share `coverage` of the world lies.
+#[must_use]
+pub fn coverage_threshold(coverage: f32, p: &GridParams) -> f32 {
+    let knots = coverage.clamp(0.0, 1.0) * 64.0;
+    let knot = (knots as usize).min(63);
+    let t = knots - knot as f32;
+    let at = |i: usize| p.threshold[i >> 2][i & 3];
+    at(knot) + t * (at(knot + 1) - at(knot))
+}
+
+/// Coverage wanted at a cell: uniform, or from the image, bilinear and repeated.
+#[must_use]
+pub fn coverage_at(place: &CellPlace, map: &[f32], p: &GridParams) -> f32 {
+    if p.map_width == 0 {
+        return p.coverage;
+    }
+    let position = cell_position(place, p);
+    let relative = [position[0].wrapping_sub(p.map_first_x), position[1].wrapping_sub(p.map_first_z)];
+    let at = lattice_point(relative, p.frequency_map);
+    let texel = |dx: i32, dz: i32| {
+        let x = at.cell[0].wrapping_add(dx).rem_euclid(p.map_width as i32) as usize;
+        let z = at.cell[1].wrapping_add(dz).rem_euclid(p.map_height as i32) as usize;
+        map[z * p.map_width as usize + x]
+    };
+    let (a, b, c, d) = (texel(0, 0), texel(1, 0), texel(0, 1), texel(1, 1));
+    let [u, v] = at.fraction;
+    let ab = a + u * (b - a);
+    let cd = c + u * (d - c);
+    ab + v * (cd - ab)
+}
+
+fn cell_position(place: &CellPlace, p: &GridParams) -> [i32; 2] {
+    let steps = p.ring_first[place.ring as usize][3];
+    place.absolute.map(|axis| axis.wrapping_mul(steps).wrapping_add(steps >> 1))
+}
+
+/// The column on a cell.
+#[must_use]
+pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape {
+    let weight = ring_weight(place.centre, place.ring, p);
+    let empty = CellShape { weight, ..CellShape::default() };
+    if weight <= 0.0 || coverage <= 0.0 {
+        return empty;
+    }
+    let position = cell_position(place, p);
+    let f = p.frequencies();
+    let excess = coverage_field(position, f, p.seed) - coverage_threshold(coverage, p);
+    if excess <= 0.0 {
+        return empty;
+    }
+    let inside = (excess * 1.15).min(1.0);
+    let left = 1.0 - inside;
+    let shoulder = 1.0 - left * left;
+    let tower = turret_field(position, f, p.seed) * 0.62 + 0.38;
+    let fraction = (shoulder * tower) * 0.92 + 0.08;
+    let height = fraction * p.thickness;
+    let steps_up = height * p.ring_layer[place.ring as usize][1];
+    let layers = (steps_up.ceil() as i32).clamp(1, p.ring_first[place.ring as usize][2]) as u32;
+    CellShape { layers, height, body: (excess * 3.0).min(1.0), weight }
+}
+
+fn quaternion_multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    [
+        a[3] * b[0] + b[3] * a[0] + (a[1] * b[2] - a[2] * b[1]),
+        a[3] * b[1] + b[3] * a[1] + (a[2] * b[0] - a[0] * b[2]),
+        a[3] * b[2] + b[3] * a[2] + (a[0] * b[1] - a[1] * b[0]),
+        a[3] * b[3] - (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]),
+    ]
+}
+
+/// Particle `layer` of a column, counted from its base.
+#[must_use]
+pub fn column_particle(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams) -> Particle {
+    let id = pcg(hash_lattice(place.absolute, p.seed.wrapping_add(16).wrapping_add(place.ring))
+        .wrapping_add(layer.wrapping_mul(0x9e37_79b9)));
+    let mut h = [pcg(id); 7];
+    for i in 1..7 {
+        h[i] = pcg(h[i - 1]);
+    }
+    let edge = p.ring_frame[place.ring as usize][2];
+    let step = shape.height / shape.layers as f32;
+    let up = (layer as f32 + 0.5) / shape.layers as f32;
+
+    let size = (1.0 - 0.42 * up * up) * (0.55 + 0.45 * shape.body) * (0.85 + 0.35 * unit_float(h[0]));
+    let across = edge * 0.74 * size;
+    let tall = 0.5 * step / 0.9 * (0.95 + 0.3 * unit_float(h[1]));
+    let axes = [across * (0.88 + 0.24 * unit_float(h[2])), tall.max(0.35 * across), across];
+
+    let jitter = if layer == 0 { 0.03 } else { 0.15 };
+    let x = place.centre[0] + signed_float(h[3]) * (0.4 * edge);
+    let z = place.centre[1] + signed_float(h[4]) * (0.4 * edge);
+    let (dx, dz) = (x - p.camera[0], z - p.camera[2]);
+    let base = p.altitude - (dx * dx + dz * dz) * p.inverse_diameter;
+    let y = base + (layer as f32 + 0.5) * step + signed_float(h[5]) * jitter * 2.0 * tall;
+
+    let t = signed_float(h[6]);
+    let yaw = [0.0, 2.0 * t, 0.0, 1.0 - t * t].map(|c| c / (1.0 + t * t));
+    let (tx, tz) = (0.16 * signed_float(pcg(h[6])), 0.16 * signed_float(pcg(h[6].wrapping_add(1))));
+    let length = (tx * tx + tz * tz + 1.0).sqrt();
+    let upright = quaternion_multiply([tx / length, 0.0, tz / length, 1.0 / length], yaw);
+    const HALF_ROOT: f32 = std::f32::consts::FRAC_1_SQRT_2;
+    let (rotation, semi_axes) = match h[5] % 3 {
+        0 => (upright, axes),
+        1 => (quaternion_multiply(upright, [HALF_ROOT, 0.0, 0.0, HALF_ROOT]), [axes[0], axes[2], axes[1]]),
+        _ => (quaternion_multiply(upright, [0.0, 0.0, HALF_ROOT, HALF_ROOT]), [axes[1], axes[0], axes[2]]),
+    };
+    Particle {
+        centre: [x, y, z],
+        density: p.density * (0.35 + 0.65 * shape.body),
+        rotation,
+        semi_axes,
+        fade: shape.weight,
+        colour: [1.0; 3],
+        id,
+    }
+}
+
+/// What the grid stages produce.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Grid {
+    /// Shape of every cell.
+    pub shapes: Vec<CellShape>,
+    /// First particle of every cell.
+    pub first: Vec<u32>,
+    /// The particles, cell by cell, bottom up.
+    pub particles: Vec<Particle>,
+    /// `cell << 5 | layer` of every particle.
+    pub cell_and_layer: Vec<u32>,
+}
+
+/// Generates all particles.
+#[must_use]
+pub fn generate(p: &GridParams, map: &[f32]) -> Grid {
+    let mut grid = Grid::default();
+    for cell in 0..p.cell_count() {
+        let place = cell_place(cell, p);
+        let shape = cell_shape(&place, coverage_at(&place, map, p), p);
+        grid.first.push(grid.particles.len() as u32);
+        grid.shapes.push(shape);
+        for layer in 0..shape.layers {
+            grid.particles.push(column_particle(&place, &shape, layer, p));
+            grid.cell_and_layer.push(cell << 5 | layer);
+        }
+    }
+    grid
+}

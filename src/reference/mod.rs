@@ -1,0 +1,5 @@
+//! The oracles: one plain, serial file per stage, without Vulkan. Tests compare every stage of the device with these.
+
+pub mod compact;
+pub mod density;
+pub mod grid;
