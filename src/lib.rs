@@ -7,6 +7,7 @@ pub mod density;
 pub mod error;
 pub mod gpu;
 pub mod grid;
+pub mod lighting;
 #[cfg(feature = "files")]
 pub mod output;
 pub mod params;
@@ -14,6 +15,7 @@ pub mod reference;
 #[cfg(feature = "files")]
 pub mod scene;
 pub mod shared;
+pub mod tiling;
 
 /// Every shader program, as compiled and reflected by the build.
 pub mod shaders {

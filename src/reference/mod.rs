@@ -3,3 +3,5 @@
 pub mod compact;
 pub mod density;
 pub mod grid;
+pub mod lighting;
+pub mod tiling;

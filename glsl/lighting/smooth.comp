@@ -1,0 +1,70 @@
+// Diffusion of light in the body of a cloud: a low-pass filter of the sun's transmittance over a particle and its six
+// neighbours in the grid, weighted with their density, and the share of the sky that the particle sees. Yusov 5.3, step 3.
+// Every layer has both its neighbours, layer 1 its lower one too (which Yusov's released code skips).
+// Explicit particles have no neighbours in a grid: no smoothing.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "grid/params.glsl"
+#include "common/particle.glsl"
+#include "grid/counters.glsl"
+#include "compact/index.glsl"
+#include "lighting/sky.glsl"
+layout(local_size_x = 64) in;
+
+layout(set = 0, binding = 0, std430) readonly restrict buffer GridParamsBuffer { GridParams grid; } params;
+layout(set = 0, binding = 1, std430) readonly restrict buffer CountersBuffer { Counters count; } counters;
+layout(set = 0, binding = 2, std430) readonly restrict buffer Particles { Particle particle[]; } particles;
+layout(set = 0, binding = 3, std430) readonly restrict buffer ParticleCells { uint cell_and_layer[]; } particle_cells;
+layout(set = 0, binding = 4, std430) readonly restrict buffer CellShapes { vec4 shape[]; } cell_shapes;
+layout(set = 0, binding = 5, std430) readonly restrict buffer CellFirst { uint first[]; } cell_first;
+layout(set = 0, binding = 6, std430) readonly restrict buffer SunTransmittance { float transmittance[]; } sun;
+layout(set = 0, binding = 7, std430) writeonly restrict buffer ParticleLights { ParticleLight light[]; } particle_lights;
+layout(push_constant) uniform SmoothPush {
+    vec3 sun_irradiance; // at the top of the clouds [W/m²]
+    float smoothing;     // weight of a neighbour against 1 of the particle itself; 0: none
+} push;
+
+void add(uint slot, float share, inout float weighted, inout float weights) {
+    if (slot >= counters.count.stored) return;
+    float weight = share * particles.particle[slot].density * particles.particle[slot].fade;
+    weighted += weight * sun.transmittance[slot];
+    weights += weight;
+}
+
+void main() {
+    uint index = linear_index();
+    if (index >= counters.count.stored) return;
+    uint packed_cell = particle_cells.cell_and_layer[index];
+    float transmittance = sun.transmittance[index];
+    float sky = 1.0;
+    if (packed_cell != NO_CELL) {
+        uint cell = packed_cell >> 5u, layer = packed_cell & 31u;
+        uint dim = params.grid.ring_dim;
+        ivec2 local = ivec2(int(cell % dim), int(cell / dim % dim));
+        vec4 shape = cell_shapes.shape[cell];
+        uint layers = uint(shape.w);
+        float height = (float(layer) + 0.5) * shape.x / shape.w;
+        float weighted = 0.0, weights = 0.0, open = 0.0;
+        add(index, 1.0, weighted, weights);
+        if (layer > 0u) add(index - 1u, push.smoothing, weighted, weights);
+        if (layer + 1u < layers) add(index + 1u, push.smoothing, weighted, weights);
+        for (int dz = -1; dz <= 1; ++dz) {
+            for (int dx = -1; dx <= 1; ++dx) {
+                ivec2 other = local + ivec2(dx, dz);
+                if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, ivec2(int(dim))))) {
+                    open += sky_openness(shape.x - height); // beyond the ring: like here
+                    continue;
+                }
+                uint neighbour = uint(int(cell) + dz * int(dim) + dx);
+                vec4 neighbour_shape = cell_shapes.shape[neighbour];
+                open += sky_openness(neighbour_shape.x - height);
+                if (abs(dx) + abs(dz) == 1 && layer < uint(neighbour_shape.w)) {
+                    add(cell_first.first[neighbour] + layer, push.smoothing, weighted, weights);
+                }
+            }
+        }
+        transmittance = weights > 0.0 ? weighted / weights : transmittance;
+        sky = sky_visibility(open / 9.0);
+    }
+    particle_lights.light[index] = ParticleLight(push.sun_irradiance * transmittance, sky);
+}

@@ -1,0 +1,88 @@
+// Which tiles a particle covers, which tile a point looks in, and the order of a list.
+#ifndef WELKIN_TILING_TILE
+#define WELKIN_TILING_TILE
+#include "compact/view.glsl"
+#include "tiling/params.glsl"
+
+struct TileRange {
+    ivec2 least;
+    ivec2 greatest; // inclusive; less than `least` in a component: none
+};
+
+// Footprint of the particle in a level: the bounding rectangle, conservative by 1 % and 0.5 m.
+TileRange particle_tiles(Particle p, uint level, in TilingParams t) {
+    vec3 relative = p.centre - t.centre;
+    vec2 at = vec2(dot(relative, t.u_axis), dot(relative, t.v_axis));
+    vec2 extent = vec2(ellipsoid_extent(p, t.u_axis), ellipsoid_extent(p, t.v_axis)) * 1.01 + 0.5;
+    vec4 rect = t.level_rect[level];
+    vec2 least = (at - extent - rect.xy) * rect.zw;
+    vec2 greatest = (at + extent - rect.xy) * rect.zw;
+    float dim = float(t.tile_dim);
+    return TileRange(ivec2(clamp(floor(least), vec2(0.0), vec2(dim))), ivec2(clamp(floor(greatest), vec2(-1.0), vec2(dim - 1.0))));
+}
+
+// Whether any receiver of the level may lie in the particle's shadow inside the slab. Receivers of level i lie between
+// two Chebyshev distances from the centre; the shadow runs `reach` metres away from the light.
+bool shades_level(Particle p, uint level, in TilingParams t) {
+    vec3 a = p.centre - t.centre;
+    float horizontal = length(t.to_sun.xz);
+    vec2 shadow = horizontal > 1e-6 ? t.to_sun.xz * (t.reach / horizontal) : vec2(0.0);
+    vec2 b = a.xz - shadow;
+    float radius = max(p.semi_axes.x, max(p.semi_axes.y, p.semi_axes.z)) + 1.0;
+    // The Chebyshev norm is convex: greatest at an end of the segment. Its least is bounded by each axis alone.
+    float greatest = max(max(abs(a.x), abs(a.z)), max(abs(b.x), abs(b.y))) + radius;
+    float least_x = a.x * b.x <= 0.0 ? 0.0 : min(abs(a.x), abs(b.x));
+    float least_z = a.z * b.y <= 0.0 ? 0.0 : min(abs(a.z), abs(b.y));
+    float least = max(least_x, least_z) - radius;
+    return greatest >= t.level_range[level].x && least <= t.level_range[level].y;
+}
+
+// Level that a receiver uses; level_count outside all.
+uint receiver_level(vec3 p_ws, in TilingParams t) {
+    vec2 d = abs(p_ws.xz - t.centre.xz);
+    float distance = max(d.x, d.y);
+    uint level = 0u;
+    while (level < t.level_count && distance > t.level_range[level].y) ++level;
+    return level;
+}
+
+uint tile_index(ivec2 tile, uint level, in TilingParams t) {
+    return (level * t.tile_dim + uint(tile.y)) * t.tile_dim + uint(tile.x);
+}
+
+// Tile of a receiver, or NO_NODE.
+uint receiver_tile(vec3 p_ws, in TilingParams t) {
+    uint level = receiver_level(p_ws, t);
+    if (level >= t.level_count) return NO_NODE;
+    vec3 relative = p_ws - t.centre;
+    vec2 at = (vec2(dot(relative, t.u_axis), dot(relative, t.v_axis)) - t.level_rect[level].xy) * t.level_rect[level].zw;
+    ivec2 tile = ivec2(floor(at));
+    if (any(lessThan(tile, ivec2(0))) || any(greaterThanEqual(tile, ivec2(t.tile_dim)))) return NO_NODE;
+    return tile_index(tile, level, t);
+}
+
+// Depth towards the light [m]. Exact arithmetic: the same order on every device.
+float light_depth(vec3 centre, in TilingParams t) {
+    precise float x = centre.x - t.centre.x;
+    precise float y = centre.y - t.centre.y;
+    precise float z = centre.z - t.centre.z;
+    precise float along_x = x * t.to_sun.x;
+    precise float along_y = y * t.to_sun.y;
+    precise float along_z = z * t.to_sun.z;
+    precise float result = (along_x + along_y) + along_z;
+    return result;
+}
+
+// Key that sorts ascending what is nearest the light first.
+uint light_key(float depth) {
+    uint bits = floatBitsToUint(depth);
+    uint ascending = (bits >> 31u) != 0u ? ~bits : bits | 0x80000000u;
+    return ~ascending;
+}
+
+float key_depth(uint key) {
+    uint ascending = ~key;
+    return uintBitsToFloat((ascending >> 31u) != 0u ? ascending & 0x7fffffffu : ~ascending);
+}
+
+#endif

@@ -1,0 +1,117 @@
+//! Light that reaches each particle: the sun's, dimmed by the particles in front (Yusov 5.3), and the sky's.
+//!
+//! ```text
+//! let lighting = Lighting::new(&gpu, set.capacity())?;
+//! rec.pass("lighting", |rec| lighting.record(rec, &tiling, &set, Some(&grid), sun_irradiance))?;
+//! ```
+//!
+//! Other shaders get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::Result;
+use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Recorder};
+use crate::grid::{Grid, GridParams, ParticleSet};
+use crate::shaders::{lighting_smooth_comp as smooth, lighting_sun_comp as sun};
+use crate::tiling::Tiling;
+
+/// Weight of a grid neighbour in smoothing, against 1 of the particle itself (tuned).
+pub const SMOOTHING: f32 = 0.7;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct SmoothPush {
+    sun_irradiance: [f32; 3],
+    smoothing: f32,
+}
+
+/// Computes [`ParticleLight`](crate::shared::ParticleLight) for every stored particle.
+pub struct Lighting {
+    sun: ComputePipeline,
+    smooth: ComputePipeline,
+    transmittance: Buffer,
+    /// Stand-ins for the grid's lists when particles come from a list.
+    no_grid: [Buffer; 3],
+    capacity: u32,
+}
+
+impl Lighting {
+    /// For lists of `capacity` particles.
+    pub fn new(gpu: &Arc<Gpu>, capacity: u32) -> Result<Self> {
+        let no_grid = [
+            Buffer::new(gpu, "no grid params", size_of::<GridParams>() as u64, BufferKind::Upload)?,
+            Buffer::array::<[f32; 4]>(gpu, "no cell shapes", 1)?,
+            Buffer::array::<u32>(gpu, "no cell first", 1)?,
+        ];
+        no_grid[0].write(0, &[GridParams::zeroed()]);
+        Ok(Self {
+            sun: ComputePipeline::new(gpu, &sun::PROGRAM, &[])?,
+            smooth: ComputePipeline::new(gpu, &smooth::PROGRAM, &[])?,
+            transmittance: Buffer::array::<f32>(gpu, "sun transmittance", capacity as usize)?,
+            no_grid,
+            capacity,
+        })
+    }
+
+    /// Sun transmittance of every particle before smoothing.
+    #[must_use]
+    pub fn transmittance(&self) -> &Buffer {
+        &self.transmittance
+    }
+
+    /// Follows a [`ParticleSet`] that has grown; the device must be idle. True if it did.
+    pub fn grow(&mut self, gpu: &Arc<Gpu>, set: &ParticleSet) -> Result<bool> {
+        if set.capacity() <= self.capacity {
+            return Ok(false);
+        }
+        *self = Self::new(gpu, set.capacity())?;
+        Ok(true)
+    }
+
+    /// Records occlusion and smoothing. `grid` is none for explicit particles, which are not smoothed and see the whole
+    /// sky; `sun_irradiance` is that above the clouds.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        tiling: &Tiling,
+        set: &ParticleSet,
+        grid: Option<&Grid>,
+        sun_irradiance: [f32; 3],
+    ) -> Result<()> {
+        assert!(set.capacity() <= self.capacity, "the particle set has grown: call grow() too");
+        let slot = rec.slot();
+        rec.dispatch_indirect(
+            &self.sun,
+            &sun::Bindings {
+                params: tiling.params(slot),
+                particles: set.particles(),
+                tile_heads: tiling.heads(),
+                tile_nodes: tiling.nodes(),
+                counters: set.counters(),
+                sun: &self.transmittance,
+            },
+            &(),
+            set.args(),
+            ParticleSet::PARTICLE_ARGS,
+        )?;
+        let [no_params, no_shapes, no_first] = &self.no_grid;
+        rec.dispatch_indirect(
+            &self.smooth,
+            &smooth::Bindings {
+                params: grid.map_or(no_params, |grid| grid.params(slot)),
+                counters: set.counters(),
+                particles: set.particles(),
+                particle_cells: set.cells(),
+                cell_shapes: grid.map_or(no_shapes, Grid::cell_shapes),
+                cell_first: grid.map_or(no_first, Grid::cell_first),
+                sun: &self.transmittance,
+                particle_lights: set.lights(),
+            },
+            &SmoothPush { sun_irradiance, smoothing: SMOOTHING },
+            set.args(),
+            ParticleSet::PARTICLE_ARGS,
+        )
+    }
+}
