@@ -84,9 +84,13 @@ pub struct FrameParams {
     pub seed: u32,
     /// Time of the frame [s].
     pub time: f32,
+    /// The floating origin in the scene's coordinates [m]: anchors noise to the world.
+    pub origin: [f32; 3],
+    /// Mean of the density profile over a chord through the middle of a particle.
+    pub fill: f32,
 }
 assert_layout!(FrameParams, frame_params, {
     camera: CAMERA, tan_half_fov_y: TAN_HALF_FOV_Y, right: RIGHT, aspect: ASPECT, up: UP, width: WIDTH,
     forward: FORWARD, height: HEIGHT, to_sun: TO_SUN, sigma_t: SIGMA_T, low_width: LOW_WIDTH,
-    low_height: LOW_HEIGHT, seed: SEED, time: TIME,
+    low_height: LOW_HEIGHT, seed: SEED, time: TIME, origin: ORIGIN, fill: FILL,
 });

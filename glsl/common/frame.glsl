@@ -17,6 +17,8 @@ struct FrameParams {
     uint  low_height;
     uint  seed;
     float time;             // [s]
+    vec3  origin;           // the floating origin in the scene's coordinates [m]: anchors noise to the world
+    float fill;             // mean of the density profile over a chord through the middle [1]
 };
 
 // Unit ray through `pixel` (texel units, centre of the first pixel at 0.5) of an image of `size`; row 0 is the top.

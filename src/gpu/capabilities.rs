@@ -4,7 +4,7 @@ use ash::vk;
 use std::ffi::CStr;
 
 /// Device features that Welkin must have, by their Vulkan names. An engine that lends its device enables these.
-pub const FEATURES_WANTED: [&str; 7] = [
+pub const FEATURES_WANTED: [&str; 8] = [
     "apiVersion >= 1.3",
     "synchronization2",
     "dynamicRendering",
@@ -12,6 +12,7 @@ pub const FEATURES_WANTED: [&str; 7] = [
     "fragmentStoresAndAtomics",
     "independentBlend",
     "shaderStorageImageExtendedFormats",
+    "shaderStorageImageWriteWithoutFormat",
 ];
 
 /// Features that Welkin uses where they exist.
@@ -108,6 +109,7 @@ impl Capabilities {
         need(core.fragment_stores_and_atomics != 0, "fragmentStoresAndAtomics");
         need(core.independent_blend != 0, "independentBlend");
         need(core.shader_storage_image_extended_formats != 0, "shaderStorageImageExtendedFormats");
+        need(core.shader_storage_image_write_without_format != 0, "shaderStorageImageWriteWithoutFormat");
         need(family.is_some(), "a queue with graphics and compute");
 
         let queue_family = family.unwrap_or(0);

@@ -312,7 +312,8 @@ fn create_device(
     let core = vk::PhysicalDeviceFeatures::default()
         .fragment_stores_and_atomics(true)
         .independent_blend(true)
-        .shader_storage_image_extended_formats(true);
+        .shader_storage_image_extended_formats(true)
+        .shader_storage_image_write_without_format(true);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true);
     let mut ordered =

@@ -1,0 +1,17 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// vertex: blend/particle.vert
+// Mode `alpha`: sorted alpha blending by fixed function, the fallback that runs anywhere. Overlap is ignored: each
+// particle lies wholly in front of those drawn before it.
+#include "blend/shade.glsl"
+#include "blend/bindings.glsl"
+#include "blend/segment.glsl"
+layout(location = 0) out vec4 cloud;      // C (1 - T), T: blended as rgb + a · destination, a · destination
+layout(location = 1) out float nearest;   // blended as minimum [m]
+
+void main() {
+    Segment s = fragment_segment();
+    if (s.optical_depth <= 0.0) discard;
+    cloud = vec4(s.colour * opacity(s.optical_depth), exp(-s.optical_depth));
+    nearest = s.t_enter;
+}

@@ -1,0 +1,12 @@
+// What every mode's fragment shader reads. The vertex shader shares bindings 0 to 2.
+layout(binding = 0, std430) restrict readonly buffer Frame { FrameParams params; } frame;
+layout(binding = 1, std430) restrict readonly buffer Particles { Particle elements[]; } particles;
+layout(binding = 2, std430) restrict readonly buffer Order { uint indices[]; } order;
+layout(binding = 3, std430) restrict readonly buffer Lights { ParticleLight elements[]; } lights;
+layout(binding = 4, std430) restrict readonly buffer Medium { MediumParams params; } medium;
+layout(binding = 5) uniform sampler3D optical_depth_lut;
+layout(binding = 6) uniform sampler3D scattering_lut;
+layout(binding = 7) uniform sampler3D detail_tile;
+layout(binding = 8) uniform sampler2D opaque_distance;
+
+layout(location = 0) flat in uint particle_index;

@@ -1,0 +1,57 @@
+// The segment that this fragment's particle cuts out of its view ray. Included after the bindings that it reads.
+layout(constant_id = 0) const uint LIGHTING = LIGHTING_TABLES;
+layout(constant_id = 1) const uint HOMOGENEOUS = 0;   // 1: density 1 everywhere inside, no table and no detail
+
+Segment fragment_segment() {
+    FrameParams f = frame.params;
+    Particle p = particles.elements[particle_index];
+    vec3 dir = view_ray(f, gl_FragCoord.xy, vec2(f.low_width, f.low_height));
+    BallRay ray = ball_ray(p, f.camera, dir);
+    if (ray.b2 >= 1.0) return NO_SEGMENT;
+
+    float half_chord = sqrt(1.0 - ray.b2);
+    float radius = 1.0;
+    vec3 normal_shift = vec3(0.0);
+    float depth = 0.0;
+    if (HOMOGENEOUS == 0u && medium.params.detail > 0.0) {
+        float t_surface = ray.t_closest - half_chord * ray.metres;
+        vec3 position = f.camera + t_surface * dir + f.origin;
+        float size = min(p.semi_axes.x, min(p.semi_axes.y, p.semi_axes.z));
+        float footprint = max(t_surface, 0.0) * 2.0 * f.tan_half_fov_y / float(f.low_height);
+        Detail d = surface_detail(detail_tile, position, size, footprint);
+        depth = min(medium.params.detail * d.depth / size, 0.6);
+        normal_shift = d.gradient * medium.params.detail * medium.params.relief;
+        radius = 1.0 - depth;
+        if (ray.b2 >= radius * radius) return NO_SEGMENT;
+        half_chord = sqrt(radius * radius - ray.b2);
+    }
+
+    float t_enter = ray.t_closest - half_chord * ray.metres;
+    float t_exit = ray.t_closest + half_chord * ray.metres;
+    float t_opaque = texelFetch(opaque_distance, ivec2(gl_FragCoord.xy), 0).x;
+    Segment s;
+    s.t_enter = max(t_enter, 0.0);
+    s.t_exit = min(t_exit, t_opaque);
+    float length_inside = s.t_exit - s.t_enter;
+    if (length_inside <= 0.0) return NO_SEGMENT;
+
+    vec3 entry_us = (ray.closest - half_chord * ray.dir_us) / radius;
+    vec2 matter = HOMOGENEOUS == 1u ? vec2(1.0, 0.0) : optical_depth_lookup(optical_depth_lut, entry_us, ray.dir_us);
+    float sigma = f.sigma_t * p.density * p.fade * matter.x;
+    s.optical_depth = sigma * length_inside;
+    if (s.optical_depth <= 0.0) return NO_SEGMENT;
+
+    if (LIGHTING == LIGHTING_FLAT) {
+        s.colour = p.colour;
+    } else {
+        // The noise's slope turns the surface that light meets, but never away from the eye.
+        vec3 normal_us = entry_us + rotate_inverse(p.rotation, normal_shift);
+        normal_us -= max(dot(normal_us, ray.dir_us) + 0.05, 0.0) * ray.dir_us;
+        normal_us = normalize(normal_us);
+        vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
+        float tau_chord = sigma * (t_exit - t_enter);
+        s.colour = shade_tables(medium.params, lights.elements[particle_index], scattering_lut, f, p, ray, normal_us,
+                                dir, normal_ws, tau_chord, matter.y + depth);
+    }
+    return s;
+}

@@ -1,0 +1,171 @@
+//! Compositing: particles become segments of view rays, and segments become three images (Yusov 5.4, 5.5).
+//!
+//! Every mode takes the same segments (`glsl/blend/segment.glsl`) and writes the same [`CloudTargets`]; they differ in
+//! how the segments of one pixel are combined:
+//!
+//! | mode | how | state per pixel |
+//! |---|---|---|
+//! | [`Interlock`](crate::params::Blend::Interlock) | volume-aware merge in drawing order, ordered by `VK_EXT_fragment_shader_interlock` | 40 bytes |
+//! | [`Alpha`](crate::params::Blend::Alpha) | fixed-function blending of sorted particles; overlap is ignored | none |
+
+mod alpha;
+mod interlock;
+pub mod medium;
+
+use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder, Sampler};
+use crate::params::{Blend, Lighting, Precision};
+use crate::{Error, Result};
+use ash::vk;
+use std::sync::Arc;
+
+/// The images that every mode writes.
+pub struct CloudTargets {
+    /// In-scattered radiance in rgb [W m⁻² sr⁻¹], transmittance in a.
+    pub cloud: Image,
+    /// Distance to the first cloud along the ray [m]; 1e30 where there is none.
+    pub nearest: Image,
+}
+
+impl CloudTargets {
+    /// Targets of `extent` pixels.
+    pub fn new(gpu: &Arc<Gpu>, extent: [u32; 2], precision: Precision) -> Result<Self> {
+        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        let image = |name, format| {
+            Image::new(gpu, &ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage })
+        };
+        Ok(Self { cloud: image("cloud", cloud_format(precision))?, nearest: image("nearest", NEAREST_FORMAT)? })
+    }
+}
+
+const NEAREST_FORMAT: vk::Format = vk::Format::R32_SFLOAT;
+
+fn cloud_format(precision: Precision) -> vk::Format {
+    match precision {
+        Precision::F16 => vk::Format::R16G16B16A16_SFLOAT,
+        Precision::F32 => vk::Format::R32G32B32A32_SFLOAT,
+    }
+}
+
+/// Value of `nearest` where there is no cloud [m].
+pub const NO_CLOUD: f32 = 1e30;
+
+/// What the particles are drawn from.
+#[derive(Clone, Copy)]
+pub struct BlendInputs<'a> {
+    /// [`FrameParams`](crate::shared::FrameParams).
+    pub frame: &'a Buffer,
+    /// [`Particle`](crate::shared::Particle)s.
+    pub particles: &'a Buffer,
+    /// Indices of the visible particles, back to front.
+    pub order: &'a Buffer,
+    /// [`ParticleLight`](crate::shared::ParticleLight)s.
+    pub lights: &'a Buffer,
+    /// [`MediumParams`](medium::MediumParams).
+    pub medium: &'a Buffer,
+    /// Optical depth table.
+    pub optical_depth_lut: &'a Image,
+    /// Scattering table.
+    pub scattering_lut: &'a Image,
+    /// Tile of billow noise.
+    pub detail_tile: &'a Image,
+    /// Distance to the opaque scene at the resolution of the targets [m].
+    pub opaque_distance: &'a Image,
+    /// `VkDrawIndirectCommand`: 4 vertices, one instance for each visible particle.
+    pub draw_args: &'a Buffer,
+    /// Where in it the command lies [bytes].
+    pub draw_args_offset: u64,
+}
+
+/// Which mode was asked for, which is used, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// As asked.
+    pub requested: Blend,
+    /// As used.
+    pub used: Blend,
+    /// Why `used` was taken.
+    pub reason: String,
+}
+
+/// Picks the mode, once. `Auto` takes interlock where there is one, else sorted alpha.
+///
+/// # Errors
+/// [`Error::Unsupported`], with the reason, if a mode is asked for by name that the device cannot do.
+pub fn choose(requested: Blend, capabilities: &Capabilities) -> Result<Choice> {
+    let choice = |used, reason: String| Ok(Choice { requested, used, reason });
+    match requested {
+        Blend::Auto => match supports(Blend::Interlock(1), capabilities) {
+            Ok(()) => choice(Blend::Interlock(1), "the device has fragment shader interlock".to_owned()),
+            Err(reason) => choice(Blend::Alpha, format!("no interlock: {reason}")),
+        },
+        mode => match supports(mode, capabilities) {
+            Ok(()) => choice(mode, "as requested".to_owned()),
+            Err(reason) => Err(Error::Unsupported {
+                needed: format!("blend mode {mode} ({reason})"),
+                by: capabilities.device_name.clone(),
+            }),
+        },
+    }
+}
+
+/// Whether a device can run `mode`, or a sentence why not.
+pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> {
+    match mode {
+        Blend::Auto | Blend::Alpha => Ok(()),
+        Blend::Interlock(1) => capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
+        other => Err(format!("{other} is not in this version yet")),
+    }
+}
+
+enum Mode {
+    Interlock(interlock::Interlock),
+    Alpha(alpha::Alpha),
+}
+
+/// Draws particles into [`CloudTargets`] by one mode.
+pub struct Blender {
+    mode: Mode,
+    extent: [u32; 2],
+}
+
+/// What the blend pipelines are specialised for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Shading {
+    /// Tables or constant colours.
+    pub lighting: Lighting,
+    /// Constant density inside each ellipsoid: no density table, no detail.
+    pub homogeneous: bool,
+}
+
+impl Shading {
+    fn specialization(self) -> [(&'static str, u32); 2] {
+        [("LIGHTING", u32::from(self.lighting == Lighting::Flat)), ("HOMOGENEOUS", u32::from(self.homogeneous))]
+    }
+}
+
+impl Blender {
+    /// Pipelines and per-pixel state of `mode` (not `Auto`: see [`choose`]) for targets of `extent` pixels.
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        mode: Blend,
+        shading: Shading,
+        extent: [u32; 2],
+        precision: Precision,
+    ) -> Result<Self> {
+        let mode = match choose(mode, gpu.capabilities())?.used {
+            Blend::Interlock(_) => Mode::Interlock(interlock::Interlock::new(gpu, shading, extent)?),
+            _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),
+        };
+        Ok(Self { mode, extent })
+    }
+
+    /// Records the drawing of all visible particles.
+    pub fn record(&self, rec: &mut Recorder<'_>, inputs: &BlendInputs<'_>, targets: &CloudTargets) -> Result<()> {
+        match &self.mode {
+            Mode::Interlock(mode) => mode.record(rec, inputs, targets, self.extent),
+            Mode::Alpha(mode) => mode.record(rec, inputs, targets, self.extent),
+        }
+    }
+}
+
+const OPTICAL_DEPTH_SAMPLER: Sampler = Sampler::LinearRepeatClampRepeat;
