@@ -2,8 +2,10 @@
 
 #![deny(clippy::unwrap_used, clippy::expect_used)] // Tests and examples may.
 
+pub mod blend;
 pub mod compact;
 pub mod density;
+pub mod detail;
 pub mod error;
 pub mod gpu;
 pub mod grid;

@@ -30,9 +30,8 @@ impl CloudTargets {
     /// Targets of `extent` pixels.
     pub fn new(gpu: &Arc<Gpu>, extent: [u32; 2], precision: Precision) -> Result<Self> {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::COLOR_ATTACHMENT;
-        let image = |name, format| {
-            Image::new(gpu, &ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage })
-        };
+        let image =
+            |name, format| Image::new(gpu, &ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage });
         Ok(Self { cloud: image("cloud", cloud_format(precision))?, nearest: image("nearest", NEAREST_FORMAT)? })
     }
 }
@@ -145,13 +144,7 @@ impl Shading {
 
 impl Blender {
     /// Pipelines and per-pixel state of `mode` (not `Auto`: see [`choose`]) for targets of `extent` pixels.
-    pub fn new(
-        gpu: &Arc<Gpu>,
-        mode: Blend,
-        shading: Shading,
-        extent: [u32; 2],
-        precision: Precision,
-    ) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, mode: Blend, shading: Shading, extent: [u32; 2], precision: Precision) -> Result<Self> {
         let mode = match choose(mode, gpu.capabilities())?.used {
             Blend::Interlock(_) => Mode::Interlock(interlock::Interlock::new(gpu, shading, extent)?),
             _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),

@@ -4,11 +4,12 @@ use ash::vk;
 use std::ffi::CStr;
 
 /// Device features that Welkin must have, by their Vulkan names. An engine that lends its device enables these.
-pub const FEATURES_WANTED: [&str; 8] = [
+pub const FEATURES_WANTED: [&str; 9] = [
     "apiVersion >= 1.3",
     "synchronization2",
     "dynamicRendering",
     "timelineSemaphore",
+    "shaderDemoteToHelperInvocation",
     "fragmentStoresAndAtomics",
     "independentBlend",
     "shaderStorageImageExtendedFormats",
@@ -105,6 +106,7 @@ impl Capabilities {
         need((major, minor) >= (1, 3), &format!("Vulkan 1.3 (the device has {major}.{minor})"));
         need(v13.synchronization2 != 0, "synchronization2");
         need(v13.dynamic_rendering != 0, "dynamicRendering");
+        need(v13.shader_demote_to_helper_invocation != 0, "shaderDemoteToHelperInvocation");
         need(v12.timeline_semaphore != 0, "timelineSemaphore");
         need(core.fragment_stores_and_atomics != 0, "fragmentStoresAndAtomics");
         need(core.independent_blend != 0, "independentBlend");

@@ -315,7 +315,10 @@ fn create_device(
         .shader_storage_image_extended_formats(true)
         .shader_storage_image_write_without_format(true);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true);
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
+        .synchronization2(true)
+        .dynamic_rendering(true)
+        .shader_demote_to_helper_invocation(true);
     let mut ordered =
         vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT::default().fragment_shader_pixel_interlock(true);
     let mut attachment = vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT::default()

@@ -4,4 +4,5 @@ pub mod compact;
 pub mod density;
 pub mod grid;
 pub mod lighting;
+pub mod segments;
 pub mod tiling;

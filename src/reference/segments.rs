@@ -131,7 +131,9 @@ mod tests {
 
     #[test]
     fn the_merge_is_exact_for_two_in_either_order_containment_included() {
-        for (a, b) in [((1.0, 3.0), (2.0, 5.0)), ((1.0, 6.0), (2.0, 3.0)), ((2.0, 3.0), (2.0, 4.0)), ((1.0, 2.0), (1.0, 2.0))] {
+        for (a, b) in
+            [((1.0, 3.0), (2.0, 5.0)), ((1.0, 6.0), (2.0, 3.0)), ((2.0, 3.0), (2.0, 4.0)), ((1.0, 2.0), (1.0, 2.0))]
+        {
             let (a, b) = (segment(0.1, 1.3, a.0, a.1), segment(0.8, 0.4, b.0, b.1));
             assert_close(merged(&[a, b]), exact(&[a, b]), 1e-13);
             assert_close(merged(&[b, a]), exact(&[a, b]), 1e-13);
