@@ -189,8 +189,8 @@ fn max_error(
             let expected = reference(&s);
             let got = picture.cloud[(y * SIZE + x) as usize];
             covered += usize::from(!s.is_empty());
-            for i in 0..3 {
-                worst = worst.max((f64::from(got[i]) - expected.radiance[i]).abs());
+            for (got, expected) in got.iter().zip(expected.radiance) {
+                worst = worst.max((f64::from(*got) - expected).abs());
             }
             worst = worst.max((f64::from(got[3]) - expected.transmittance).abs());
             let near = s.iter().map(|s| s.t_enter).fold(f64::from(NO_CLOUD), f64::min);

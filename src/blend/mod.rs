@@ -116,6 +116,7 @@ pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> 
     }
 }
 
+#[allow(clippy::large_enum_variant)] // A renderer has one.
 enum Mode {
     Interlock(interlock::Interlock),
     Alpha(alpha::Alpha),

@@ -110,7 +110,8 @@ impl ResourceState {
             *self = Self { write: (stages, accesses & WRITES), ..Self::default() };
         } else {
             self.readers |= stages;
-            if !self.write.0.is_empty() && !(self.visible.0.contains(stages) && self.visible.1.contains(accesses)) {
+            let visible = self.visible.0.contains(stages) && self.visible.1.contains(accesses);
+            if !self.write.0.is_empty() && !visible {
                 // The pair of masks is a product: widen both together, so that it stays true of every combination.
                 self.visible = (self.visible.0 | stages, self.visible.1 | accesses);
                 barrier.add(self.write, self.visible);

@@ -160,7 +160,7 @@ impl Capabilities {
             Feature::RasterizationOrderAttachmentAccess => &self.attachment_access,
             Feature::Timestamps => &self.timestamps,
         };
-        answer.as_ref().map(|()| ()).map_err(String::as_str)
+        answer.as_ref().copied().map_err(String::as_str)
     }
 
     /// Marks a feature that the device has, but that the engine did not enable.
