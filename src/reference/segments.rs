@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn three_overlapping_segments_tell_the_modes_apart() {
         // If the approximations agreed with the exact answer here, the comparisons above would mean little.
-        let s = [segment(0.0, 1.0, 2.0, 6.0), segment(1.0, 1.0, 1.0, 5.0), segment(0.5, 1.0, 0.0, 4.0)];
+        let s = [segment(0.0, 1.0, 2.0, 6.0), segment(0.5, 1.0, 1.0, 5.0), segment(1.0, 1.0, 0.0, 4.0)];
         let error = |c: Composite| (c.radiance[0] - exact(&s).radiance[0]).abs();
         assert!(error(alpha(&s)) > 1e-2);
         assert!(error(merged(&s)) > 1e-4 && error(merged(&s)) < error(alpha(&s)));
