@@ -1,5 +1,6 @@
 //! The oracles: one plain, serial file per stage, without Vulkan. Tests compare every stage of the device with these.
 
+pub mod atmosphere;
 pub mod compact;
 pub mod density;
 pub mod grid;
