@@ -2,6 +2,7 @@
 
 #![deny(clippy::unwrap_used, clippy::expect_used)] // Tests and examples may.
 
+pub mod atmosphere;
 pub mod blend;
 pub mod compact;
 pub mod density;
@@ -14,6 +15,7 @@ pub mod lighting;
 pub mod output;
 pub mod params;
 pub mod reference;
+pub mod renderer;
 #[cfg(feature = "files")]
 pub mod scene;
 pub mod shared;

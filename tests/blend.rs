@@ -1,6 +1,8 @@
 //! Compositing of constant-colour ellipsoids against the exact f64 integral along each pixel's ray.
 
 use ash::vk;
+use bytemuck::Zeroable;
+use welkin::atmosphere::SkyLight;
 use welkin::blend::medium::MediumParams;
 use welkin::blend::{BlendInputs, Blender, CloudTargets, NO_CLOUD, Shading};
 use welkin::detail::DetailTile;
@@ -128,6 +130,7 @@ fn draw(device: &mut Standalone, mode: Blend, particles: &[Particle], opaque: f3
     let order = upload("order", bytemuck::cast_slice(&order));
     let lights = upload("lights", bytemuck::cast_slice(&lights));
     let medium = upload("medium", bytemuck::bytes_of(&MediumParams::new(&Clouds::default())));
+    let sky_light = Buffer::upload(&gpu, "sky light", &[SkyLight::zeroed()]).unwrap();
     let args = upload("args", bytemuck::bytes_of(&[4u32, particles.len() as u32, 0, 0]));
     let image = |name, extent, format| {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE;
@@ -148,6 +151,7 @@ fn draw(device: &mut Standalone, mode: Blend, particles: &[Particle], opaque: f3
         order: &order,
         lights: &lights,
         medium: &medium,
+        sky_light: &sky_light,
         optical_depth_lut: &unused,
         scattering_lut: &unused,
         detail_tile: &detail.image,

@@ -9,4 +9,6 @@ layout(binding = 6) uniform sampler3D scattering_lut;
 layout(binding = 7) uniform sampler3D detail_tile;
 layout(binding = 8) uniform sampler2D opaque_distance;
 
+layout(binding = 12, std430) restrict readonly buffer Sky { SkyLight params; } sky_light;
+
 layout(location = 0) flat in uint particle_index;

@@ -50,7 +50,7 @@ Segment fragment_segment() {
         normal_us = normalize(normal_us);
         vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
         float tau_chord = sigma * (t_exit - t_enter);
-        s.colour = shade_tables(medium.params, lights.elements[particle_index], scattering_lut, f, p, ray, normal_us,
+        s.colour = shade_tables(medium.params, sky_light.params, lights.elements[particle_index], scattering_lut, f, p, ray, normal_us,
                                 dir, normal_ws, tau_chord, matter.y + depth);
     }
     return s;

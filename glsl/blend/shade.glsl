@@ -2,6 +2,7 @@
 // function evaluated here, multiple scattering, ambient light with the crease term, detail noise.
 #ifndef BLEND_SHADE
 #define BLEND_SHADE
+#include "atmosphere/params.glsl"
 #include "blend/ellipsoid.glsl"
 #include "blend/merge.glsl"
 #include "detail/displace.glsl"
@@ -9,24 +10,26 @@
 #include "lut/scattering_lookup.glsl"
 #include "medium/phase.glsl"
 
-// What the clouds are made of and the light around them. Twin: src/blend/medium.rs.
+// What the clouds are made of. Twin: src/blend/medium.rs.
 struct MediumParams {
-    vec3  sky;              // mean radiance of the sky's upper half [W m⁻² sr⁻¹]
     float g_single;         // asymmetry of the event that meets the sun
-    vec3  ground;           // mean radiance of the lower half: light that comes up from the ground
     uint  phase_function;   // PHASE_*
     float albedo;           // single-scattering albedo
     float crease;           // strength of the crease term [1]
     float detail;           // strength of the detail noise [1]; 0 turns it off
     float relief;           // how much of the noise's slope turns the surface for lighting [1]
+    float reserved_a;
+    float reserved_b;
 };
+
+const float PI = 3.14159265358979;
 
 const uint LIGHTING_TABLES = 0u;
 const uint LIGHTING_FLAT = 1u;
 
 // Mean source function of sunlight and skylight along the ray: the colour C of the segment.
 // `entry_us` is where the lit surface lies and `mu` the cosine of incidence, after detail has moved both.
-vec3 shade_tables(MediumParams medium, ParticleLight light, sampler3D scattering, FrameParams frame, Particle p,
+vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sampler3D scattering, FrameParams frame, Particle p,
                   BallRay ray, vec3 entry_us, vec3 dir, vec3 normal_ws, float tau_chord, float first_matter) {
     vec3 to_sun_us = normalize(to_unit_ball(p, vec4(frame.to_sun, 0.0)));
     float mu = max(-dot(entry_us, ray.dir_us), 1e-3);
@@ -37,13 +40,13 @@ vec3 shade_tables(MediumParams medium, ParticleLight light, sampler3D scattering
     float single = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_single).x;
     float multiple = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_multiple).y;
     float p_sun = phase(dot(frame.to_sun, dir), medium.g_single, medium.phase_function);
-    vec3 sunlight = light.sun * (medium.albedo * p_sun * single + multiple);
+    vec3 sunlight = sky.sun_irradiance_clouds * light.sun * (medium.albedo * p_sun * single + multiple);
 
-    // Sky and ground as two half-spheres of constant radiance, seen by the surface; creases, which lie deep below the
+    // Sky and ground as two half-spheres of constant radiance E / π, seen by the surface; creases, which lie deep below the
     // ellipsoid, are brighter than edges (Yusov 4.4).
     float up = 0.5 + 0.5 * normal_ws.y;
     float crease = 1.0 + medium.crease * (first_matter - 0.25);
-    vec3 skylight = mix(medium.ground, medium.sky, up) * light.ambient * crease;
+    vec3 skylight = mix(sky.ground_irradiance_clouds, sky.sky_irradiance_clouds, up) * (light.ambient * crease / PI);
     return sunlight + skylight;
 }
 

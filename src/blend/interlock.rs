@@ -53,6 +53,7 @@ impl Interlock {
                 order: inputs.order,
                 lights: inputs.lights,
                 medium: inputs.medium,
+                sky_light: inputs.sky_light,
                 optical_depth_lut: inputs.optical_depth_lut.sampled(OPTICAL_DEPTH_SAMPLER),
                 scattering_lut: inputs.scattering_lut.sampled(Sampler::LinearClamp),
                 detail_tile: inputs.detail_tile.sampled(Sampler::LinearRepeat),

@@ -61,6 +61,8 @@ pub struct BlendInputs<'a> {
     pub lights: &'a Buffer,
     /// [`MediumParams`](medium::MediumParams).
     pub medium: &'a Buffer,
+    /// [`SkyLight`](crate::atmosphere::SkyLight).
+    pub sky_light: &'a Buffer,
     /// Optical depth table.
     pub optical_depth_lut: &'a Image,
     /// Scattering table.

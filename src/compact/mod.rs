@@ -25,8 +25,8 @@ use crate::shared::FrameParams;
 pub use scan::Scan;
 pub use sort::Sort;
 
-/// Vertices that a particle's instance has: its box as a triangle strip.
-pub const VERTICES_PER_PARTICLE: u32 = 14;
+/// Vertices that a particle's instance has: the quad around its silhouette as a triangle strip.
+pub const VERTICES_PER_PARTICLE: u32 = 4;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -1,0 +1,293 @@
+//! The frame: owns the passes and records them in the order of the paper's pipeline.
+//!
+//! `density` and `grid` (or an explicit list) make particles → `compact` keeps and sorts the visible ones → `tiling` and
+//! `lighting` find the sunlight that reaches each → `blend` draws them into the cloud targets. Nothing is read back,
+//! allocated or compiled inside a frame; lists that were too small are grown between frames ([`Renderer::finish`]).
+
+use crate::Result;
+use crate::atmosphere::SkyLight;
+use crate::blend::medium::MediumParams;
+use crate::blend::{BlendInputs, Blender, Choice, CloudTargets, Shading, choose};
+use crate::compact::{Compact, frustum_planes};
+use crate::detail::DetailTile;
+use crate::gpu::{Buffer, BufferKind, Gpu, Image, Recorder};
+use crate::grid::{CounterReadback, Counters, Grid, GridDesign, ParticleList, ParticleSet};
+use crate::lighting::Lighting;
+use crate::params::{Camera, Params, Source, Style};
+use crate::shared::FrameParams;
+use crate::tiling::{Slab, Tiling, TilingParams};
+use std::sync::Arc;
+
+/// Radius of the planet at sea level [m].
+pub const PLANET_RADIUS: f64 = 6.36e6;
+
+/// Light list nodes to begin with, per particle that fits.
+const NODES_PER_PARTICLE: u32 = 10;
+
+/// The particle tables that shading reads.
+#[derive(Clone, Copy)]
+pub struct TableImages<'a> {
+    /// Optical depth of the reference particle (Yusov 4.1).
+    pub optical_depth: &'a Image,
+    /// Single and multiple scattering of the homogeneous sphere (Yusov 4.2, 4.3).
+    pub scattering: &'a Image,
+    /// Mean of the density profile along a chord through the middle of the particle.
+    pub fill: f32,
+}
+
+/// Where the particles come from.
+enum Particles {
+    Grid(Box<Grid>, Box<GridDesign>),
+    List(ParticleList),
+}
+
+/// Records cloudy frames of one scene at one size.
+pub struct Renderer {
+    params: Params,
+    extent: [u32; 2],
+    low_extent: [u32; 2],
+    choice: Choice,
+    particles: Particles,
+    set: ParticleSet,
+    compact: Compact,
+    tiling: Tiling,
+    lighting: Lighting,
+    detail: DetailTile,
+    detail_filled: bool,
+    blender: Blender,
+    targets: CloudTargets,
+    frame: Vec<Buffer>,
+    medium: Buffer,
+    sky_light: Buffer,
+    opaque: Image,
+    counters: CounterReadback,
+}
+
+/// Sizes of the lists and what the last frame wanted of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ListUse {
+    /// Name of the list.
+    pub name: &'static str,
+    /// Elements wanted.
+    pub needed: u32,
+    /// Elements that fit.
+    pub capacity: u32,
+}
+
+impl Renderer {
+    /// Pipelines, lists and targets for `params` at `extent` pixels, with `slots` frames in flight.
+    pub fn new(gpu: &Arc<Gpu>, params: &Params, extent: [u32; 2], slots: usize) -> Result<Self> {
+        params.validate()?;
+        let quality = &params.quality;
+        let low_extent = extent.map(|pixels| pixels.div_ceil(quality.downscale));
+        let choice = choose(quality.blend, gpu.capabilities())?;
+        let shading =
+            Shading { lighting: params.clouds.lighting, homogeneous: params.clouds.style == Style::Homogeneous };
+        let (particles, capacity) = match &params.clouds.source {
+            Source::Particles(list) => {
+                let list = ParticleList::new(gpu, list, slots)?;
+                let count = list.count();
+                (Particles::List(list), count)
+            }
+            _ => {
+                let design = GridDesign::new(&params.clouds, quality, PLANET_RADIUS);
+                let grid = Grid::new(gpu, &design, &params.clouds.coverage, slots)?;
+                let estimate = design.particle_estimate();
+                (Particles::Grid(Box::new(grid), Box::new(design)), estimate)
+            }
+        };
+        let levels = match &particles {
+            Particles::Grid(_, design) => design.level_half_widths().len() as u32,
+            Particles::List(_) => 1,
+        };
+        let set = ParticleSet::new(gpu, capacity)?;
+        let frame = (0..slots)
+            .map(|_| Buffer::new(gpu, "frame params", size_of::<FrameParams>() as u64, BufferKind::Upload))
+            .collect::<Result<_>>()?;
+        let sky_light = SkyLight { sun_irradiance_clouds: params.sun.irradiance, ..bytemuck::Zeroable::zeroed() };
+        Ok(Self {
+            compact: Compact::new(gpu, set.capacity())?,
+            tiling: Tiling::new(gpu, levels, set.capacity().saturating_mul(NODES_PER_PARTICLE), slots)?,
+            lighting: Lighting::new(gpu, set.capacity())?,
+            detail: DetailTile::new(gpu)?,
+            detail_filled: false,
+            blender: Blender::new(gpu, choice.used, shading, low_extent, quality.precision)?,
+            targets: CloudTargets::new(gpu, low_extent, quality.precision)?,
+            frame,
+            medium: Buffer::upload(gpu, "medium", &[MediumParams::new(&params.clouds)])?,
+            sky_light: Buffer::upload(gpu, "sky light", &[sky_light])?,
+            opaque: Image::new(
+                gpu,
+                &crate::gpu::ImageDesc {
+                    name: "opaque distance",
+                    extent: [low_extent[0], low_extent[1], 0],
+                    format: ash::vk::Format::R32_SFLOAT,
+                    usage: ash::vk::ImageUsageFlags::SAMPLED | ash::vk::ImageUsageFlags::STORAGE,
+                },
+            )?,
+            counters: CounterReadback::new(gpu, slots)?,
+            params: params.clone(),
+            extent,
+            low_extent,
+            choice,
+            particles,
+            set,
+        })
+    }
+
+    /// Which blend mode is used, and why.
+    #[must_use]
+    pub fn choice(&self) -> &Choice {
+        &self.choice
+    }
+
+    /// What the blend stage wrote.
+    #[must_use]
+    pub fn targets(&self) -> &CloudTargets {
+        &self.targets
+    }
+
+    /// Records one frame seen by `camera`.
+    pub fn record(&mut self, rec: &mut Recorder<'_>, camera: &Camera, tables: TableImages<'_>) -> Result<()> {
+        let slot = rec.slot();
+        let origin = floating_origin(camera);
+        let frame = self.frame_params(camera, origin, tables.fill);
+        self.frame[slot].write(0, &[frame]);
+
+        if !self.detail_filled {
+            self.detail.record(rec)?;
+            self.detail_filled = true;
+        }
+        let to_sun = self.params.sun.to_sun();
+        let occlusion = self.params.clouds.sigma_t * tables.fill * self.params.clouds.xi;
+        let (set, grid) = (&self.set, &mut self.particles);
+        let slab = match grid {
+            Particles::Grid(grid, design) => {
+                let params = design.frame(camera.position, origin);
+                rec.pass("grid", |rec| grid.record(rec, &params, set))?;
+                let clouds = &self.params.clouds;
+                TilingParams::new(
+                    to_sun,
+                    &Slab {
+                        centre: std::array::from_fn(|i| camera.position[i] - origin[i]),
+                        base: f64::from(clouds.altitude),
+                        thickness: f64::from(clouds.thickness),
+                        half_widths: &design.level_half_widths(),
+                        greatest_extent: design.greatest_extent(),
+                        planet_radius: PLANET_RADIUS,
+                    },
+                    occlusion,
+                )
+            }
+            Particles::List(list) => {
+                rec.pass("grid", |rec| list.record(rec, origin, set))?;
+                let [least, greatest] = list.bounds();
+                let centre: [f64; 3] = std::array::from_fn(|i| 0.5 * (least[i] + greatest[i]) - origin[i]);
+                let half = (0.5 * (greatest[0] - least[0])).max(0.5 * (greatest[2] - least[2]));
+                TilingParams::new(
+                    to_sun,
+                    &Slab {
+                        centre,
+                        base: least[1] - origin[1],
+                        thickness: greatest[1] - least[1],
+                        half_widths: &[half],
+                        greatest_extent: list.greatest_extent(),
+                        planet_radius: f64::INFINITY,
+                    },
+                    occlusion,
+                )
+            }
+        };
+        rec.pass("compact", |rec| self.compact.record(rec, set, &frustum_planes(&frame), frame.camera))?;
+        rec.pass("tiling", |rec| self.tiling.record(rec, &slab, set))?;
+        let grid = match &self.particles {
+            Particles::Grid(grid, _) => Some(&**grid),
+            Particles::List(_) => None,
+        };
+        // The sun's irradiance above the clouds is multiplied in by the shading: here it is a transmittance.
+        rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid, [1.0; 3]))?;
+        rec.clear_image(&self.opaque, [crate::blend::NO_CLOUD; 4]);
+        let inputs = BlendInputs {
+            frame: &self.frame[slot],
+            particles: self.set.particles(),
+            order: self.compact.order(),
+            lights: self.set.lights(),
+            medium: &self.medium,
+            sky_light: &self.sky_light,
+            optical_depth_lut: tables.optical_depth,
+            scattering_lut: tables.scattering,
+            detail_tile: &self.detail.image,
+            opaque_distance: &self.opaque,
+            draw_args: self.compact.args(),
+            draw_args_offset: Compact::DRAW_ARGS,
+        };
+        self.blender.record(rec, &inputs, &self.targets)?;
+        self.counters.record(rec, &self.set);
+        Ok(())
+    }
+
+    /// Looks at the counts of the frame in `slot`, which must have ended, and grows the lists that were too small. True
+    /// if any was: the frame lacks particles or shadows, and should be recorded again where that matters. The device
+    /// must be idle, and the caller then calls [`RecorderState::forget`](crate::gpu::RecorderState::forget).
+    pub fn finish(&mut self, gpu: &Arc<Gpu>, slot: usize) -> Result<bool> {
+        let counters = self.counters.read(slot);
+        let mut grew = self.set.grow(gpu, &counters)?;
+        if let Particles::Grid(grid, _) = &mut self.particles {
+            grew |= grid.grow(gpu, &counters)?;
+        }
+        grew |= self.compact.grow(gpu, &self.set)?;
+        grew |= self.lighting.grow(gpu, &self.set)?;
+        grew |= self.tiling.grow(gpu, &counters)?;
+        Ok(grew)
+    }
+
+    /// Counts of the frame in `slot`, which must have ended.
+    #[must_use]
+    pub fn counters(&self, slot: usize) -> Counters {
+        self.counters.read(slot)
+    }
+
+    /// Every list with its size and what the frame in `slot` wanted of it.
+    #[must_use]
+    pub fn lists(&self, slot: usize) -> Vec<ListUse> {
+        let counters = self.counters(slot);
+        let mut lists = vec![
+            ListUse { name: "particles", needed: counters.generated, capacity: self.set.capacity() },
+            ListUse { name: "tile_nodes", needed: counters.tile_nodes, capacity: self.tiling.node_capacity() },
+        ];
+        if let Particles::Grid(grid, _) = &self.particles {
+            let capacity = grid.valid_cell_capacity();
+            lists.push(ListUse { name: "valid_cells", needed: counters.valid_cells, capacity });
+        }
+        lists
+    }
+
+    fn frame_params(&self, camera: &Camera, origin: [f64; 3], fill: f32) -> FrameParams {
+        let basis = camera.basis();
+        let f32s = |v: [f64; 3]| v.map(|c| c as f32);
+        FrameParams {
+            camera: std::array::from_fn(|i| (camera.position[i] - origin[i]) as f32),
+            tan_half_fov_y: (camera.fov_y.to_radians() * 0.5).tan() as f32,
+            right: f32s(basis.right),
+            aspect: self.extent[0] as f32 / self.extent[1] as f32,
+            up: f32s(basis.up),
+            width: self.extent[0],
+            forward: f32s(basis.forward),
+            height: self.extent[1],
+            to_sun: f32s(self.params.sun.to_sun()),
+            sigma_t: self.params.clouds.sigma_t,
+            low_width: self.low_extent[0],
+            low_height: self.low_extent[1],
+            seed: self.params.clouds.seed,
+            time: 0.0,
+            origin: f32s(origin),
+            fill,
+        }
+    }
+}
+
+/// Near the camera, at sea level, on a lattice of 1024 m: positions relative to it are small and change rarely.
+fn floating_origin(camera: &Camera) -> [f64; 3] {
+    let snap = |x: f64| (x / 1024.0).round() * 1024.0;
+    [snap(camera.position[0]), 0.0, snap(camera.position[2])]
+}
