@@ -30,21 +30,25 @@ fn vec(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))
 }
 
-/// Whether the particle's exact footprint rectangle, shrunk by `margin` metres, touches the tile. A list must hold every
-/// particle with `margin` 0; it may hold those whose rectangle misses by 1 % of its size and 1 m.
+/// First and last tile (u, v) of the level that the particle's bounding rectangle touches, grown by `margin` times its
+/// size + `margin` × 100 m; clamped to the level's tiles. Empty if a last is below its first.
+///
+/// A list must hold what touches with `margin` 0; it may hold what touches with 0.02 (the shader adds 1 % and 0.5 m).
 #[must_use]
-pub fn covers_tile(particle: &Particle, level: u32, tile: [u32; 2], margin: f64, t: &TilingParams) -> bool {
+pub fn tile_range(particle: &Particle, level: u32, margin: f64, t: &TilingParams) -> [[i64; 2]; 2] {
     let rotation = DQuat::from_array(particle.rotation.map(f64::from));
     let relative = vec(particle.centre) - vec(t.centre);
     let rect = t.level_rect[level as usize].map(f64::from);
-    [t.u_axis, t.v_axis].iter().enumerate().all(|(axis, &direction)| {
-        let direction = vec(direction);
-        let at = relative.dot(direction);
-        let extent = (vec(particle.semi_axes) * (rotation.inverse() * direction)).length() - margin;
-        let tile_least = rect[axis] + f64::from(tile[axis]) / rect[axis + 2];
-        let tile_greatest = rect[axis] + f64::from(tile[axis] + 1) / rect[axis + 2];
-        at - extent <= tile_greatest && at + extent >= tile_least
-    })
+    let mut range = [[0; 2]; 2];
+    for (axis, &direction) in [t.u_axis, t.v_axis].iter().enumerate() {
+        let at = relative.dot(vec(direction)) - rect[axis];
+        let extent = (vec(particle.semi_axes) * (rotation.inverse() * vec(direction))).length();
+        let reach = extent * (1.0 + margin) + margin * 100.0;
+        let last = i64::from(t.tile_dim) - 1;
+        range[0][axis] = (((at - reach) * rect[axis + 2]).floor() as i64).max(0);
+        range[1][axis] = (((at + reach) * rect[axis + 2]).floor() as i64).min(last);
+    }
+    range
 }
 
 /// Level of a receiver at `p`, as the shader picks it; none outside all.
