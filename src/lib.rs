@@ -13,6 +13,7 @@ pub mod grid;
 pub mod lighting;
 #[cfg(feature = "files")]
 pub mod output;
+pub mod lut;
 pub mod params;
 pub mod reference;
 pub mod renderer;

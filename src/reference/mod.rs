@@ -1,9 +1,15 @@
-//! The oracles: one plain, serial file per stage, without Vulkan. Tests compare every stage of the device with these.
+//! The oracles: one plain file per stage, without Vulkan. Tests compare every stage of the device with these.
 
 pub mod atmosphere;
 pub mod compact;
 pub mod density;
 pub mod grid;
 pub mod lighting;
+pub mod monte_carlo;
+pub mod phase;
+pub mod quadrature;
+pub mod scattering;
 pub mod segments;
+pub mod sphere;
 pub mod tiling;
+pub mod transport;

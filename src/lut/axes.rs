@@ -1,0 +1,152 @@
+//! Shapes and coordinate mappings of the tables, with exact inverses; domain ends lie on texel centres.
+//!
+//! GLSL twins: `glsl/lut/scattering_lookup.glsl` and `glsl/lut/optical_depth_lookup.glsl`, where the meaning of every
+//! coordinate is told.
+
+use crate::reference::sphere::RayCoordinates;
+use std::f64::consts::PI;
+
+/// Shape of the optical depth table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OpticalDepthShape {
+    /// Azimuth of the entry point; wraps, texel centres at i + ½.
+    pub phi_s: u32,
+    /// Zenith of the entry point and of the direction (the same number of both).
+    pub theta: u32,
+    /// Azimuth of the direction; wraps, texel centres at i + ½.
+    pub phi_v: u32,
+}
+
+impl OpticalDepthShape {
+    /// 64 × 32 × 64 × 32 (Yusov 5.1).
+    pub const FULL: Self = Self { phi_s: 64, theta: 32, phi_v: 64 };
+    /// For a first picture.
+    pub const COARSE: Self = Self { phi_s: 32, theta: 16, phi_v: 32 };
+
+    /// Extent of the 3D image that holds it: zenith slices of the direction are tiled along y.
+    pub fn image_extent(self) -> [u32; 3] {
+        [self.phi_s, self.theta * self.theta, self.phi_v]
+    }
+
+    /// Azimuth of texel `i` of `n` [rad].
+    pub fn azimuth(i: u32, n: u32) -> f64 {
+        2.0 * PI * (f64::from(i) + 0.5) / f64::from(n)
+    }
+
+    /// Zenith of the entry point at texel `i` [rad], 0..=π.
+    pub fn theta_s(self, i: u32) -> f64 {
+        PI * f64::from(i) / f64::from(self.theta - 1)
+    }
+
+    /// Zenith of the direction at texel `i` [rad], 0..=π/2.
+    pub fn theta_v(self, i: u32) -> f64 {
+        0.5 * PI * f64::from(i) / f64::from(self.theta - 1)
+    }
+}
+
+/// Shape and range of the scattering tables.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScatteringShape {
+    /// Scattering angle.
+    pub theta: u32,
+    /// Azimuth to the sun about the ray.
+    pub psi: u32,
+    /// Zenith cosine of the ray.
+    pub mu: u32,
+}
+
+/// Number of levels of optical radius.
+pub const LEVELS: u32 = 8;
+/// Optical radius of the first level; below the thinnest ring-0 particle of the paper.
+pub const R_MIN: f64 = 0.5;
+/// Optical radius of the last level. Colours are constant beyond.
+pub const R_MAX: f64 = 128.0;
+/// Optical depth below which chords are spaced evenly, above it geometrically (tuned).
+pub const MU_SCALE: f64 = 1.0;
+
+impl ScatteringShape {
+    /// 32 × 64 × 16 (× 8 levels), as in Yusov 5.1.
+    pub const FULL: Self = Self { theta: 32, psi: 64, mu: 16 };
+    /// For a first picture.
+    pub const COARSE: Self = Self { theta: 16, psi: 24, mu: 10 };
+
+    /// Extent of the 3D image that holds it: levels are stacked along z.
+    pub fn image_extent(self) -> [u32; 3] {
+        [self.theta, self.psi, self.mu * LEVELS]
+    }
+
+    /// Number of texels of one level.
+    pub fn level_len(self) -> usize {
+        (self.theta * self.psi * self.mu) as usize
+    }
+
+    /// Optical radius of a level, evenly spaced in log2.
+    pub fn optical_radius(level: u32) -> f64 {
+        R_MIN * (R_MAX / R_MIN).powf(f64::from(level) / f64::from(LEVELS - 1))
+    }
+
+    /// Level of an optical radius, a real number in `0..=LEVELS - 1`; inverse of [`Self::optical_radius`].
+    pub fn level(optical_radius: f64) -> f64 {
+        (optical_radius.clamp(R_MIN, R_MAX) / R_MIN).ln() / (R_MAX / R_MIN).ln() * f64::from(LEVELS - 1)
+    }
+
+    /// Ray of the texel (i, j, k) at an optical radius.
+    pub fn coordinates(self, texel: [u32; 3], optical_radius: f64) -> RayCoordinates {
+        let t = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
+        let full = 2.0 * optical_radius / MU_SCALE;
+        RayCoordinates {
+            theta: PI * t(texel[0], self.theta).powi(2),
+            psi: PI * t(texel[1], self.psi),
+            mu: if texel[2] + 1 == self.mu { 1.0 } else { (t(texel[2], self.mu) * full.asinh()).sinh() / full },
+        }
+    }
+
+    /// Real texel position of a ray; inverse of [`Self::coordinates`].
+    pub fn texel(self, c: &RayCoordinates, optical_radius: f64) -> [f64; 3] {
+        let full = 2.0 * optical_radius / MU_SCALE;
+        let t = [(c.theta / PI).sqrt(), c.psi / PI, (full * c.mu).asinh() / full.asinh()];
+        [
+            t[0] * f64::from(self.theta - 1),
+            t[1] * f64::from(self.psi - 1),
+            t[2] * f64::from(self.mu - 1),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texel_centres_map_back_to_themselves_and_domain_ends_are_texels() {
+        for shape in [ScatteringShape::FULL, ScatteringShape::COARSE] {
+            for level in 0..LEVELS {
+                let r = ScatteringShape::optical_radius(level);
+                assert!((ScatteringShape::level(r) - f64::from(level)).abs() < 1e-12);
+                for i in 0..shape.theta {
+                    for (j, k) in [(0, 0), (shape.psi / 2, shape.mu / 2), (shape.psi - 1, shape.mu - 1)] {
+                        let back = shape.texel(&shape.coordinates([i, j, k], r), r);
+                        let error = (back[0] - f64::from(i)).abs()
+                            + (back[1] - f64::from(j)).abs()
+                            + (back[2] - f64::from(k)).abs();
+                        assert!(error < 1e-11, "{shape:?} {level} {i} {j} {k}: {back:?}");
+                    }
+                }
+                let first = shape.coordinates([0, 0, 0], r);
+                let last = shape.coordinates([shape.theta - 1, shape.psi - 1, shape.mu - 1], r);
+                assert_eq!(first, RayCoordinates { theta: 0.0, psi: 0.0, mu: 0.0 });
+                assert_eq!(last, RayCoordinates { theta: PI, psi: PI, mu: 1.0 });
+            }
+        }
+        assert_eq!(ScatteringShape::optical_radius(0), R_MIN);
+        assert_eq!(ScatteringShape::optical_radius(LEVELS - 1), R_MAX);
+    }
+
+    #[test]
+    fn zeniths_of_the_optical_depth_table_end_on_texels() {
+        let shape = OpticalDepthShape::FULL;
+        assert_eq!((shape.theta_s(0), shape.theta_v(0)), (0.0, 0.0));
+        assert_eq!((shape.theta_s(31), shape.theta_v(31)), (PI, 0.5 * PI));
+        assert_eq!(shape.image_extent(), [64, 1024, 64]);
+    }
+}

@@ -1,0 +1,4 @@
+//! Particle tables, built once per medium and style: optical depth (Yusov 4.1) and scattering (4.2, 4.3).
+
+pub mod axes;
+pub mod transport;

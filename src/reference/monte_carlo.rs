@@ -1,0 +1,210 @@
+//! Monte Carlo truth for the homogeneous unit ball in a parallel beam of unit irradiance.
+//!
+//! Analogue random walks; nothing is shared with the solver but the phase functions. Every number comes with its standard
+//! error. Work is split over threads in fixed blocks with a seed each, so a result does not depend on their number.
+
+use super::phase::PhaseFunction;
+use super::sphere::{LitRay, distance_to_surface};
+use glam::DVec3;
+use std::f64::consts::PI;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The scattering medium of the tables.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Which phase function.
+    pub phase: PhaseFunction,
+    /// Asymmetry of the event that meets the sun.
+    pub g_sun: f64,
+    /// Asymmetry of every other event.
+    pub g: f64,
+    /// Single-scattering albedo, 0..=1.
+    pub albedo: f64,
+}
+
+/// Mean of a quantity with its standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Mean.
+    pub mean: f64,
+    /// Standard error of the mean.
+    pub error: f64,
+}
+
+/// The next number in [0, 1) of a SplitMix64 sequence.
+pub fn next_uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
+/// Turns a unit vector by an angle of the given cosine about a uniform azimuth.
+fn turn(dir: DVec3, cos: f64, azimuth: f64) -> DVec3 {
+    let (a, b) = dir.any_orthonormal_pair();
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    (cos * dir + sin * (azimuth.cos() * a + azimuth.sin() * b)).normalize()
+}
+
+/// Runs `work(i)` for i in 0..count on all cores and returns the results in order.
+pub fn parallel<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let mut parts: Vec<(usize, T)> = std::thread::scope(|scope| {
+        let handles: Vec<_> = (0..threads)
+            .map(|_| {
+                scope.spawn(|| {
+                    let mut mine = Vec::new();
+                    loop {
+                        let i = next.fetch_add(1, Ordering::Relaxed);
+                        if i >= count {
+                            return mine;
+                        }
+                        mine.push((i, work(i)));
+                    }
+                })
+            })
+            .collect();
+        handles.into_iter().filter_map(|h| h.join().ok()).flatten().collect()
+    });
+    parts.sort_by_key(|(i, _)| *i);
+    parts.into_iter().map(|(_, t)| t).collect()
+}
+
+/// Radiance from light scattered twice or more, leaving along `ray` towards the eye [1/sr].
+///
+/// Walks backwards from the eye; each vertex but the first adds the sun's light scattered there (with `g_sun`) and then
+/// sent along the walk. The first free path is conditioned on an event inside the chord, and the walk ends at the surface.
+pub fn multiple_scattering(
+    medium: &Medium,
+    ray: &LitRay,
+    optical_radius: f64,
+    orders: Option<u32>,
+    walks: u32,
+    seed: u64,
+) -> Estimate {
+    let mut state = seed.wrapping_mul(0xd129_0d3a_61ab_b4f5) ^ 0x5851_f42d_4c95_7f2d;
+    let chord = distance_to_surface(ray.entry, ray.dir);
+    let opacity = -(-optical_radius * chord).exp_m1();
+    let (mut sum, mut sum_squares) = (0.0, 0.0);
+    for _ in 0..walks {
+        let mut dir = ray.dir;
+        let mut weight = opacity * medium.albedo;
+        let mut point = ray.entry - dir * (-next_uniform(&mut state) * opacity).ln_1p() / optical_radius;
+        let mut radiance = 0.0;
+        for order in 2.. {
+            if orders.is_some_and(|n| order > n) {
+                break;
+            }
+            let cos = medium.phase.sample(medium.g, || next_uniform(&mut state));
+            dir = turn(dir, cos, 2.0 * PI * next_uniform(&mut state));
+            let free = -(1.0 - next_uniform(&mut state)).ln() / optical_radius;
+            if free >= distance_to_surface(point, dir) {
+                break;
+            }
+            point += dir * free;
+            weight *= medium.albedo;
+            let to_sun = distance_to_surface(point, ray.to_sun);
+            radiance += weight
+                * medium.phase.eval(ray.to_sun.dot(dir), medium.g_sun)
+                * (-optical_radius * to_sun).exp();
+        }
+        sum += radiance;
+        sum_squares += radiance * radiance;
+    }
+    let n = f64::from(walks);
+    let mean = sum / n;
+    Estimate { mean, error: ((sum_squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt() }
+}
+
+/// Where the light of the beam goes, as fractions of the light that meets the ball.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Balance {
+    /// Crosses without an event.
+    pub transmitted: Estimate,
+    /// Leaves after one or more events.
+    pub scattered: Estimate,
+    /// Mean cosine between the beam and the scattered light.
+    pub mean_cosine: Estimate,
+    /// Mean path inside the ball of everything that leaves, in radii.
+    pub path_length: Estimate,
+}
+
+/// Follows `photons` of the beam through the ball (forward, so here `g_sun` belongs to the first event).
+pub fn balance(medium: &Medium, optical_radius: f64, photons: u32, seed: u64) -> Balance {
+    let blocks = 64;
+    let sums = parallel(blocks, |block| {
+        let mut state = seed ^ (block as u64 + 1).wrapping_mul(0xa076_1d64_78bd_642f);
+        let mut sums = [[0.0f64; 2]; 4];
+        for _ in 0..photons / blocks as u32 {
+            let (u, v) = (next_uniform(&mut state), 2.0 * PI * next_uniform(&mut state));
+            let mut dir = DVec3::Z;
+            let mut point = DVec3::new(u.sqrt() * v.cos(), u.sqrt() * v.sin(), -(1.0 - u).sqrt());
+            let (mut weight, mut path, mut events) = (1.0, 0.0, 0);
+            loop {
+                let free = -(1.0 - next_uniform(&mut state)).ln() / optical_radius;
+                let exit = distance_to_surface(point, dir);
+                path += free.min(exit);
+                if free >= exit {
+                    break;
+                }
+                point += dir * free;
+                weight *= medium.albedo;
+                let g = if events == 0 { medium.g_sun } else { medium.g };
+                let cos = medium.phase.sample(g, || next_uniform(&mut state));
+                dir = turn(dir, cos, 2.0 * PI * next_uniform(&mut state));
+                events += 1;
+            }
+            let scattered = if events > 0 { weight } else { 0.0 };
+            let values = [f64::from(u8::from(events == 0)), scattered, scattered * dir.z, path * weight];
+            for (sum, value) in sums.iter_mut().zip(values) {
+                sum[0] += value;
+                sum[1] += value * value;
+            }
+        }
+        sums
+    });
+    let n = f64::from(photons / blocks as u32 * blocks as u32);
+    let estimate = |k: usize| {
+        let (s, s2) = sums.iter().fold((0.0, 0.0), |a, b| (a.0 + b[k][0], a.1 + b[k][1]));
+        let mean = s / n;
+        Estimate { mean, error: ((s2 / n - mean * mean).max(0.0) / n).sqrt() }
+    };
+    let (scattered, cosine) = (estimate(1), estimate(2));
+    Balance {
+        transmitted: estimate(0),
+        scattered,
+        mean_cosine: Estimate { mean: cosine.mean / scattered.mean, error: cosine.error / scattered.mean },
+        path_length: estimate(3),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::scattering::{MEAN_PATH_LENGTH, directly_transmitted};
+
+    const ISOTROPIC: Medium = Medium { phase: PhaseFunction::HenyeyGreenstein, g_sun: 0.0, g: 0.0, albedo: 1.0 };
+
+    fn assert_within(estimate: Estimate, truth: f64, what: &str) {
+        assert!((estimate.mean - truth).abs() < 4.0 * estimate.error + 1e-4, "{what}: {estimate:?}, not {truth}");
+    }
+
+    #[test]
+    fn the_walk_agrees_with_closed_forms_for_isotropic_scattering() {
+        for (r, cosine, at_09) in [(1.0, -0.0416, 0.5810), (2.0, -0.1085, 0.6681), (5.0, -0.2444, 0.6035)] {
+            let lossless = balance(&ISOTROPIC, r, 200_000, 7);
+            assert_within(lossless.transmitted, directly_transmitted(r), "transmitted");
+            assert_within(lossless.mean_cosine, cosine, "mean cosine");
+            assert_within(lossless.path_length, MEAN_PATH_LENGTH, "path length");
+            assert_within(balance(&Medium { albedo: 0.9, ..ISOTROPIC }, r, 200_000, 8).scattered, at_09, "albedo 0.9");
+        }
+    }
+
+    #[test]
+    fn the_mean_path_does_not_depend_on_the_phase_function() {
+        let medium = Medium { phase: PhaseFunction::CornetteShanks, g_sun: 0.9, g: 0.7, albedo: 1.0 };
+        assert_within(balance(&medium, 4.0, 200_000, 3).path_length, MEAN_PATH_LENGTH, "path length");
+    }
+}
