@@ -105,11 +105,7 @@ impl ScatteringShape {
     pub fn texel(self, c: &RayCoordinates, optical_radius: f64) -> [f64; 3] {
         let full = 2.0 * optical_radius / MU_SCALE;
         let t = [(c.theta / PI).sqrt(), c.psi / PI, (full * c.mu).asinh() / full.asinh()];
-        [
-            t[0] * f64::from(self.theta - 1),
-            t[1] * f64::from(self.psi - 1),
-            t[2] * f64::from(self.mu - 1),
-        ]
+        [t[0] * f64::from(self.theta - 1), t[1] * f64::from(self.psi - 1), t[2] * f64::from(self.mu - 1)]
     }
 }
 

@@ -17,7 +17,13 @@ pub struct Solution {
 }
 
 /// Solves a ball for the view rays given by their zenith cosines. `orders`: stop after that many events.
-pub fn solve(medium: &Medium, optical_radius: f64, resolution: Resolution, mus: &[f64], orders: Option<u32>) -> Solution {
+pub fn solve(
+    medium: &Medium,
+    optical_radius: f64,
+    resolution: Resolution,
+    mus: &[f64],
+    orders: Option<u32>,
+) -> Solution {
     let plan = Plan::new(medium, optical_radius, resolution, mus);
     let beam = Beam::new(&plan);
     let rotations = rotations(resolution.j_max);
@@ -64,8 +70,7 @@ impl Solution {
     /// Radiance [1/sr] on view ray `view` for a sun in the direction of the coordinates.
     pub fn radiance(&self, view: usize, c: &RayCoordinates) -> f64 {
         // In the frame of the ray (direction of travel v, side y, normal n): sun = -cosΘ v + sinΘ (cosψ y + sinψ n).
-        let (along, side, normal) =
-            (-c.theta.cos(), c.theta.sin() * c.psi.cos(), c.theta.sin() * c.psi.sin());
+        let (along, side, normal) = (-c.theta.cos(), c.theta.sin() * c.psi.cos(), c.theta.sin() * c.psi.sin());
         let gamma = (-side).atan2(along);
         let table = legendre(normal, self.j_max, self.j_max);
         let mut sum = 0.0;

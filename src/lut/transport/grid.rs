@@ -67,20 +67,29 @@ pub fn shells(optical_radius: f64, count: usize, finest: f64) -> Vec<f64> {
     radii
 }
 
-/// Impact parameters: tangent to every shell, and enough between that directions on every shell are at most `gap` apart.
-pub fn impact_parameters(shells: &[f64], gap: f64) -> Vec<f64> {
+/// Impact parameters: tangent to every shell, and enough between that directions on every shell are at most `gap` apart,
+/// closer about the tangent near the surface, where the radiance rises from nothing over a zenith cosine of 1 / 2R.
+pub fn impact_parameters(shells: &[f64], optical_radius: f64, gap: f64) -> Vec<f64> {
     let mut all = vec![0.0];
     for &r in shells {
         let last = *all.last().unwrap_or(&0.0);
-        let from = (last / r).min(1.0).asin();
-        let pieces = ((std::f64::consts::FRAC_PI_2 - from) / gap).ceil().max(1.0) as usize;
-        for k in 1..=pieces {
-            let angle = from + (std::f64::consts::FRAC_PI_2 - from) * k as f64 / pieces as f64;
-            all.push(if k == pieces { r } else { r * angle.sin() });
+        let span = (last / r).min(1.0).acos();
+        let layer = 0.25 / optical_radius + 0.5 * (optical_radius * (1.0 - r)).min(1.0);
+        let mut elevations = Vec::new();
+        let mut elevation = 0.0;
+        while elevation < span {
+            elevations.push(elevation);
+            elevation += (TANGENT_GROWTH * (elevation + layer)).min(gap);
         }
+        // Spread evenly in count so that the last gap is not a sliver.
+        let stretch = span / elevation;
+        all.extend(elevations.iter().rev().map(|e| if *e == 0.0 { r } else { r * (e * stretch).cos() }));
     }
     all
 }
+
+/// Growth of the angle between neighbouring directions with their elevation over the tangent (tuned).
+const TANGENT_GROWTH: f64 = 0.35;
 
 /// Four-point Lagrange interpolation on ascending nodes: first node and weights. Constant below the first node.
 pub fn interpolation(nodes: &[f64], at: f64) -> (usize, [f64; 4]) {
@@ -106,7 +115,10 @@ pub fn step_weights(d: f64, third: Option<f64>) -> [f64; 4] {
     let attenuation = (-d).exp();
     // Moments of u = d - t (distance back from the end): e_k = ∫_0^d u^k e^-u du.
     let (e0, e1, e2) = if d < 0.05 {
-        let series = |k: f64| d.powf(k + 1.0) * (1.0 / (k + 1.0) - d / (k + 2.0) + d * d / (2.0 * (k + 3.0)) - d * d * d / (6.0 * (k + 4.0)));
+        let series = |k: f64| {
+            d.powf(k + 1.0)
+                * (1.0 / (k + 1.0) - d / (k + 2.0) + d * d / (2.0 * (k + 3.0)) - d * d * d / (6.0 * (k + 4.0)))
+        };
         (-(-d).exp_m1(), series(1.0), series(2.0))
     } else {
         let e0 = -(-d).exp_m1();
@@ -135,10 +147,14 @@ mod tests {
                 let w = step_weights(d, Some(third));
                 let f = |t: f64| 1.0 + 0.5 * t - 0.3 * t * t;
                 let (nodes, weights) = crate::reference::quadrature::gauss_legendre(40);
-                let exact: f64 = nodes.iter().zip(&weights).map(|(x, q)| {
-                    let t = 0.5 * d * (1.0 + x);
-                    0.5 * d * q * f(t) * (t - d).exp()
-                }).sum();
+                let exact: f64 = nodes
+                    .iter()
+                    .zip(&weights)
+                    .map(|(x, q)| {
+                        let t = 0.5 * d * (1.0 + x);
+                        0.5 * d * q * f(t) * (t - d).exp()
+                    })
+                    .sum();
                 let value = w[1] * f(0.0) + w[2] * f(d) + w[3] * f(third);
                 assert!((value - exact).abs() < 1e-9, "{d} {third}: {value} {exact}");
             }

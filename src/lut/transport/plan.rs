@@ -36,7 +36,7 @@ impl Resolution {
             l_max,
             j_max: ((l_max as f64 + 16.0 + 5.0 * octaves) * detail).round() as usize,
             shells: ((16.0 + 3.5 * octaves) * detail.sqrt()).round() as usize,
-            finest: 0.1,
+            finest: 0.02,
             gap: PI / (1.4 * (l_max as f64 + 4.0)),
             step: 0.04 / detail,
         }
@@ -130,7 +130,7 @@ impl Plan {
         let radii = shells(optical_radius, resolution.shells, resolution.finest);
         let lm: Vec<(usize, usize)> = (0..=l_max).flat_map(|m| (m..=l_max).map(move |l| (l, m))).collect();
         let (mut inner, mut outer) = (RaySet::default(), RaySet::default());
-        for b in impact_parameters(&radii, resolution.gap) {
+        for b in impact_parameters(&radii, optical_radius, resolution.gap) {
             let ray = Ray::new(b, &radii, resolution.step);
             inner.push(&ray, &radii, optical_radius, &lm, l_max);
         }
