@@ -11,9 +11,9 @@ pub mod error;
 pub mod gpu;
 pub mod grid;
 pub mod lighting;
+pub mod lut;
 #[cfg(feature = "files")]
 pub mod output;
-pub mod lut;
 pub mod params;
 pub mod reference;
 pub mod renderer;

@@ -1,6 +1,10 @@
 //! The command line: what can be said, in one place.
 
-use clap::{Args, Parser, Subcommand};
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use welkin::params::Blend;
 
 /// Cumulus skies in Vulkan: a scene file goes in, a picture comes out.
 ///
@@ -16,6 +20,10 @@ pub struct Cli {
 pub enum Command {
     /// List every Vulkan device and, per compositing mode, whether it can be used or why not
     Devices(DevicesArgs),
+    /// Render scenes to pictures
+    Render(RenderArgs),
+    /// Measure the GPU time of each pass: median and 95th percentile
+    Bench(BenchArgs),
 }
 
 #[derive(Args, Debug)]
@@ -25,13 +33,208 @@ pub struct DevicesArgs {
     pub json: bool,
 }
 
+/// What picture, on what device: shared by the commands that render.
+#[derive(Args, Debug)]
+pub struct PictureArgs {
+    /// Size of the picture [pixels]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    pub size: Size,
+    /// Preset of the particle grid; keys of the scene's [quality] still count
+    #[arg(long, value_enum)]
+    pub quality: Option<QualityArg>,
+    /// How overlapping particles are composited: auto, interlock[:K], alpha
+    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
+    pub blend: Option<Blend>,
+    #[command(flatten)]
+    pub scene: SceneArgs,
+}
+
+/// Where a scene's values, device and tables come from.
+#[derive(Args, Debug)]
+pub struct SceneArgs {
+    /// Replace a value of the scene file, for example clouds.coverage=0.3; can be given again
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Device by part of its name or by its index in `welkin devices`
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+}
+
+#[derive(Args, Debug)]
+pub struct RenderArgs {
+    /// Scene files
+    #[arg(required = true, value_name = "SCENE.toml")]
+    pub scenes: Vec<PathBuf>,
+    /// Picture file, or a directory for pictures named after their scenes [default: SCENE.png in the current directory]
+    ///
+    /// .png holds the toned picture; .exr and .npy hold linear scene radiance, height x width x 3.
+    #[arg(short, long, value_name = "OUT.{png,exr,npy}")]
+    pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Render frames A to B-1 of the scene's [animation] to OUT.0000.png, OUT.0001.png, ...
+    #[arg(long, value_name = "A..B", value_parser = parse_frames)]
+    pub frames: Option<FrameRange>,
+    /// Write statistics as JSON (docs/json.md), to standard output if no file is named; with several scenes, a list
+    ///
+    /// Validation is on while statistics are taken, where the layer is installed.
+    #[arg(long, value_name = "FILE.json", num_args = 0..=1, default_missing_value = "-", value_parser = parse_stats)]
+    pub stats: Option<PathBuf>,
+    /// Write the clouds' transmittance beside the picture, as OUT.transmittance.npy
+    #[arg(long)]
+    pub aux: bool,
+    /// Write PNG with 16 bits a channel
+    #[arg(long)]
+    pub png16: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct BenchArgs {
+    /// Scene file
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// Print JSON (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+    /// Compare with this mode in the same run, frame by frame in turns
+    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
+    pub vs: Option<Blend>,
+    /// Frames measured per mode
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub measure: u32,
+    /// Frames rendered before the first measured one
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub warmup: u32,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QualityArg {
+    /// 4 rings of 104x104 cells, 2 layers
+    Low,
+    /// 4 rings of 136x136 cells, 4 layers
+    Medium,
+    /// 4 rings of 184x184 cells, 6 layers
+    High,
+}
+
+impl QualityArg {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Low => "low",
+            Self::Medium => "medium",
+            Self::High => "high",
+        }
+    }
+}
+
+/// Size of a picture [pixels].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    pub width: u32,
+    pub height: u32,
+}
+
+const MAX_SIDE: u32 = 16_384;
+/// 64 Mi pixels: 8192 × 8192. A pixel takes some 60 bytes of device memory and 28 of the host's, so this is about 6 GB.
+const MAX_PIXELS: u64 = 1 << 26;
+
+fn parse_size(text: &str) -> Result<Size, String> {
+    let expected = format!(
+        "expected WIDTHxHEIGHT, for example 1280x720: each from 1 to {MAX_SIDE}, and at most {MAX_PIXELS} pixels in all"
+    );
+    let (width, height) = text.split_once(['x', 'X']).ok_or(&expected)?;
+    let side = |text: &str| match text.parse::<u32>() {
+        Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(side),
+        _ => Err(&expected),
+    };
+    let size = Size { width: side(width)?, height: side(height)? };
+    if u64::from(size.width) * u64::from(size.height) > MAX_PIXELS { Err(expected) } else { Ok(size) }
+}
+
+fn parse_blend(text: &str) -> Result<Blend, String> {
+    text.parse().map_err(|error: welkin::Error| match error {
+        welkin::Error::InvalidParam { expected, .. } => format!("expected {expected}"),
+        other => other.to_string(),
+    })
+}
+
+/// Frames from the first up to, but not including, the last. (A `Vec` or a bare `Range` would mean something else to clap.)
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameRange(pub Range<u32>);
+
+fn parse_frames(text: &str) -> Result<FrameRange, String> {
+    let expected = "expected A..B with A below B, for example 0..10 for the frames 0 to 9; at most 100000 frames";
+    let (from, to) = text.split_once("..").ok_or(expected)?;
+    let (from, to) = (from.parse().map_err(|_| expected)?, to.parse().map_err(|_| expected)?);
+    if from < to && to - from <= 100_000 { Ok(FrameRange(from..to)) } else { Err(expected.into()) }
+}
+
+/// A scene file after `--stats` would silently be overwritten: only `.json` and `-` are taken.
+fn parse_stats(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    if json || text == "-" {
+        Ok(path)
+    } else {
+        Err("expected a name that ends in .json, or - for standard output".into())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::CommandFactory;
 
+    fn render(line: &str) -> Result<RenderArgs, String> {
+        let words = ["welkin", "render"].into_iter().chain(line.split_whitespace());
+        match Cli::try_parse_from(words).map_err(|error| error.to_string())?.command {
+            Command::Render(args) => Ok(args),
+            other => panic!("{other:?}"),
+        }
+    }
+
     #[test]
     fn the_table_of_flags_is_sound() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_full_line_is_understood() {
+        let args = render(
+            "sky.toml -o out.png --size 64x32 --quality low --blend interlock:4 --device llvm --frames 3..7 \
+             --stats s.json --set a.b=1 --set c=2 --aux --png16",
+        )
+        .unwrap();
+        assert_eq!(args.picture.size, Size { width: 64, height: 32 });
+        assert_eq!((args.picture.quality, args.picture.blend), (Some(QualityArg::Low), Some(Blend::Interlock(4))));
+        assert_eq!(args.frames, Some(FrameRange(3..7)));
+        assert_eq!((args.stats, args.picture.scene.set.len()), (Some("s.json".into()), 2));
+    }
+
+    #[test]
+    fn several_scenes_and_statistics_on_standard_output() {
+        let args = render("a.toml b.toml --stats").unwrap();
+        assert_eq!((args.scenes.len(), args.stats), (2, Some("-".into())));
+        assert!(render("--stats a.toml b.toml").unwrap_err().contains("ends in .json"));
+        assert!(render("").is_err());
+    }
+
+    #[test]
+    fn bad_values_name_flag_value_and_expectation() {
+        for size in ["0x0", "100000x100000", "16384x16384", "640", "-1x5", "axb", "1x"] {
+            let message = render(&format!("a.toml --size={size}")).unwrap_err();
+            let named = message.contains(&format!("'{size}' for '--size <WxH>'"));
+            assert!(named && message.contains("expected WIDTHxHEIGHT"), "{message}");
+        }
+        assert_eq!(render("a.toml --size 16384x4096").unwrap().picture.size.height, 4096);
+        for frames in ["3..3", "4..1", "1", "a..b", "0..200000"] {
+            let message = render(&format!("a.toml --frames {frames}")).unwrap_err();
+            assert!(message.contains("expected A..B"), "{message}");
+        }
+        let message = render("a.toml --blend glass").unwrap_err();
+        assert!(message.contains("'glass' for '--blend") && message.contains("one of auto, interlock"), "{message}");
+        assert!(render("a.toml --quality ultra").unwrap_err().contains("low, medium, high"));
     }
 }

@@ -1,7 +1,14 @@
 //! The command line: a thin shell around the library.
 
 mod args;
+mod bench;
 mod devices;
+mod places;
+mod progress;
+mod render;
+mod scenes;
+mod session;
+mod summary;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -16,6 +23,8 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse(); // Ends the process with status 2 on a usage error, 0 on --help.
     let outcome = match &cli.command {
         Command::Devices(args) => devices::run(args),
+        Command::Render(args) => render::run(args),
+        Command::Bench(args) => bench::run(args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -27,7 +27,7 @@ pub struct Stats {
     pub capacity: BTreeMap<String, CapacityStats>,
     /// Times per pass, in the order they ran; the median over the frames.
     pub passes: Vec<PassStats>,
-    /// Time on the device from the first pass to the last [ms], the median over the frames; `null` without timestamps.
+    /// Time of all passes [ms], the median over the frames; `null` without timestamps.
     pub frame_gpu_ms: Option<f64>,
     /// One entry per frame rendered.
     pub frames: Vec<FrameStats>,
@@ -108,7 +108,7 @@ pub struct FrameStats {
     pub frame: u32,
     /// The picture file.
     pub output: String,
-    /// Time on the device [ms]; `null` without timestamps.
+    /// Time of all passes [ms]; `null` without timestamps.
     pub gpu_ms: Option<f64>,
     /// Time from the call to the picture in host memory [ms].
     pub wall_ms: f64,

@@ -1,0 +1,38 @@
+//! From scene files and flags to parameters.
+
+use std::path::Path;
+
+use welkin::params::Params;
+use welkin::scene::{self, Override};
+use welkin::{Error, Result};
+
+use super::args::{PictureArgs, SceneArgs};
+
+/// The parameters of the scene file at `path` under the flags.
+pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
+    // The preset comes first, so that --set can still change a part of it.
+    let preset =
+        args.quality.map(|q| Override { flag: "--quality".into(), assignment: format!("quality.preset={}", q.name()) });
+    let overrides: Vec<_> = preset.into_iter().chain(sets(&args.scene)).collect();
+    let mut params = scene::load(path, &overrides)?;
+    if let Some(blend) = args.blend {
+        params.quality.blend = blend;
+        params.validate().map_err(|error| flagged(error, "--blend"))?;
+    }
+    Ok(params)
+}
+
+fn sets(args: &SceneArgs) -> impl Iterator<Item = Override> + '_ {
+    args.set.iter().map(|assignment| Override { flag: "--set".into(), assignment: assignment.clone() })
+}
+
+/// `error` about the compositing mode, named as the flag that chose it.
+pub fn flagged(error: Error, flag: &str) -> Error {
+    match error {
+        Error::InvalidParam { field, value, expected } if field == "quality.blend" => {
+            Error::invalid(flag, value, expected)
+        }
+        Error::Unsupported { needed, by } => Error::Unsupported { needed: needed.replace("quality.blend =", flag), by },
+        other => other,
+    }
+}

@@ -1,0 +1,203 @@
+//! A device and a renderer on it: the one place where the command line meets the renderer.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use welkin::gpu::standalone::{Options, Standalone, validation_available};
+use welkin::gpu::{Buffer, BufferKind, Image, ImageDesc};
+use welkin::output::{BlendStats, CapacityStats, DeviceStats, ParticleStats, PassStats, Picture, TableStats};
+use welkin::params::{Lighting, Params, Precision, SkyModel};
+use welkin::renderer::{ListUse, Renderer, TableImages};
+use welkin::{Error, Result};
+
+use super::args::{SceneArgs, Size};
+use super::progress::note;
+
+/// The device in use.
+pub struct Device(Standalone);
+
+impl Device {
+    /// Opens the device that the flags name. With `validate`, validation is on where its layer is installed.
+    pub fn open(args: &SceneArgs, validate: bool) -> Result<Self> {
+        let validation = validate && validation_available();
+        if validate && !validation {
+            note("the validation layer is not installed: validation_messages will be null");
+        }
+        Standalone::new(Options { device: args.device.clone(), validation, ..Options::default() }).map(Self)
+    }
+
+    pub fn stats(&self) -> DeviceStats {
+        let capabilities = self.0.gpu().capabilities();
+        DeviceStats {
+            name: capabilities.device_name.clone(),
+            driver: capabilities.driver.clone(),
+            api: capabilities.api.clone(),
+        }
+    }
+
+    /// Messages of the validation layer so far; none without the layer. Each is also written to standard error.
+    pub fn validation_messages(&self) -> Option<u64> {
+        let messages = self.0.messages()?.all();
+        messages.iter().for_each(|message| note(&format!("validation: {message}")));
+        Some(messages.len() as u64)
+    }
+}
+
+/// A frame and what is known about it.
+pub struct Frame {
+    pub picture: Picture,
+    pub times: Times,
+    pub particles: ParticleStats,
+    pub capacity: BTreeMap<String, CapacityStats>,
+}
+
+/// Times of a frame.
+pub struct Times {
+    pub passes: Vec<PassStats>,
+    /// Of all passes [ms]; none on a device without timestamps.
+    pub gpu_ms: Option<f64>,
+    pub wall_ms: f64,
+}
+
+/// How often a frame is recorded again because a list was too small. Lists grow to twice what was wanted of them, but a
+/// list that was cut short may hide what the next one needs: one turn per list, and one to spare.
+const MAX_TURNS: usize = 8;
+
+/// A renderer for one scene.
+pub struct Session {
+    renderer: Renderer,
+    readback: Buffer,
+    unused: Image,
+    size: Size,
+}
+
+impl Session {
+    pub fn open(device: &mut Device, params: &Params, size: Size) -> Result<Self> {
+        let slots = device.0.frames().slots();
+        let gpu = device.0.gpu();
+        let renderer = Renderer::new(gpu, params, [size.width, size.height], slots)?;
+        let bytes = u64::from(size.width) * u64::from(size.height) * 16;
+        let not_yet = |needed: &str| Err(Error::Unsupported { needed: needed.into(), by: "this version yet".into() });
+        if params.clouds.lighting != Lighting::Flat {
+            return not_yet("clouds.lighting = \"tables\"");
+        }
+        if params.sky.model != SkyModel::None {
+            return not_yet("sky.model = \"atmosphere\"");
+        }
+        if params.quality.downscale != 1 || params.quality.precision != Precision::F16 {
+            return not_yet("quality other than downscale = 1, precision = \"f16\"");
+        }
+        let unused = Image::new(
+            gpu,
+            &ImageDesc {
+                name: "unused table",
+                extent: [2, 2, 2],
+                format: ash::vk::Format::R16G16_SFLOAT,
+                usage: ash::vk::ImageUsageFlags::SAMPLED,
+            },
+        )?;
+        Ok(Self { renderer, readback: Buffer::new(gpu, "picture", bytes, BufferKind::Readback)?, unused, size })
+    }
+
+    pub fn blend(&self) -> BlendStats {
+        let choice = self.renderer.choice();
+        BlendStats {
+            requested: choice.requested.to_string(),
+            used: choice.used.to_string(),
+            reason: choice.reason.clone(),
+        }
+    }
+
+    pub fn tables(&self) -> Option<TableStats> {
+        None
+    }
+
+    /// Renders a frame and reads it back.
+    pub fn frame(&mut self, device: &mut Device, params: &Params) -> Result<Frame> {
+        let (slot, times) = self.run(device, params, true)?;
+        let counters = self.renderer.counters(slot);
+        let capacity = self.renderer.lists(slot).into_iter().map(|list| {
+            (list.name.to_owned(), CapacityStats { needed: list.needed.into(), capacity: list.capacity.into() })
+        });
+        Ok(Frame {
+            picture: self.picture(),
+            times,
+            particles: ParticleStats {
+                cells: counters.cells.into(),
+                valid_cells: counters.valid_cells.into(),
+                generated: counters.generated.into(),
+                visible: counters.visible.into(),
+            },
+            capacity: capacity.collect(),
+        })
+    }
+
+    /// Renders a frame for its times alone.
+    pub fn time_frame(&mut self, device: &mut Device, params: &Params) -> Result<Times> {
+        Ok(self.run(device, params, false)?.1)
+    }
+
+    pub fn memory_bytes(&self, device: &Device) -> u64 {
+        device.0.gpu().memory_use().bytes
+    }
+
+    /// Renders a frame, again where a list was too small; its slot and times.
+    fn run(&mut self, device: &mut Device, params: &Params, read: bool) -> Result<(usize, Times)> {
+        let started = Instant::now();
+        let gpu = device.0.gpu().clone();
+        let frames = device.0.frames();
+        for _ in 0..MAX_TURNS {
+            let (slot, ()) = frames.submit(|rec| {
+                self.renderer.record(
+                    rec,
+                    &params.camera,
+                    TableImages { optical_depth: &self.unused, scattering: &self.unused, fill: 1.0 },
+                )?;
+                if read {
+                    rec.copy_image_to_buffer(&self.renderer.targets().cloud, &self.readback);
+                    rec.make_visible_to_host(&self.readback);
+                }
+                Ok(())
+            })?;
+            frames.wait()?;
+            if !self.renderer.finish(&gpu, slot)? {
+                let passes: Vec<_> = frames
+                    .state()
+                    .times(slot)
+                    .into_iter()
+                    .map(|pass| PassStats { name: pass.name.into(), gpu_ms: pass.gpu_ms })
+                    .collect();
+                let gpu_ms = (!passes.is_empty()).then(|| passes.iter().map(|pass| pass.gpu_ms).sum());
+                let wall_ms = started.elapsed().as_secs_f64() * 1000.0;
+                return Ok((slot, Times { passes, gpu_ms, wall_ms }));
+            }
+            frames.state().forget();
+        }
+        Err(too_small(&self.renderer.lists(0)))
+    }
+
+    /// The picture in the readback buffer.
+    fn picture(&self) -> Picture {
+        let pixels = self.size.width as usize * self.size.height as usize;
+        let half: Vec<half::f16> = self.readback.read(0, pixels * 4);
+        let radiance: Vec<[f32; 3]> =
+            half.chunks_exact(4).map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect();
+        Picture {
+            width: self.size.width,
+            height: self.size.height,
+            display: radiance.iter().map(|c| c.map(|v| v.clamp(0.0, 1.0))).collect(),
+            transmittance: Some(half.chunks_exact(4).map(|p| p[3].to_f32()).collect()),
+            radiance,
+        }
+    }
+}
+
+/// The error for lists that never grew enough.
+fn too_small(lists: &[ListUse]) -> Error {
+    let worst = lists.iter().max_by(|a, b| {
+        let fill = |list: &ListUse| f64::from(list.needed) / f64::from(list.capacity.max(1));
+        fill(a).total_cmp(&fill(b))
+    });
+    let (list, needed, capacity) = worst.map_or(("particles", 0, 0), |l| (l.name, l.needed, l.capacity));
+    Error::Capacity { list, needed: needed.into(), capacity: capacity.into() }
+}
