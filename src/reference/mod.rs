@@ -6,6 +6,7 @@ pub mod density;
 pub mod grid;
 pub mod lighting;
 pub mod monte_carlo;
+pub mod optical_depth;
 pub mod phase;
 pub mod quadrature;
 pub mod scattering;
