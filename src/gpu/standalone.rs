@@ -123,6 +123,14 @@ fn has_layer(entry: &ash::Entry) -> bool {
     layers.iter().any(|layer| layer.layer_name_as_c_str().is_ok_and(|name| name == VALIDATION_LAYER))
 }
 
+/// Whether the validation layer has `VK_EXT_layer_settings`.
+fn takes_settings(entry: &ash::Entry) -> bool {
+    // SAFETY: a global command; the layer's name is alive.
+    let extensions =
+        unsafe { entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER)) }.unwrap_or_default();
+    extensions.iter().any(|e| e.extension_name_as_c_str().is_ok_and(|name| name == ash::ext::layer_settings::NAME))
+}
+
 struct Instance {
     debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     raw: ash::Instance,
@@ -162,7 +170,7 @@ impl Instance {
             layers.push(VALIDATION_LAYER.as_ptr());
             names.push(ash::ext::validation_features::NAME.as_ptr());
         }
-        // Old layers take the list of features, new ones the settings; each ignores what it does not know.
+        // Old layers take the list of features, new ones the settings; an old one objects to settings that it does not know.
         let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
         let on = vk::TRUE.to_ne_bytes();
@@ -183,7 +191,10 @@ impl Instance {
             .enabled_extension_names(&names)
             .enabled_layer_names(&layers);
         if validation {
-            info = info.push_next(&mut features).push_next(&mut layer_settings);
+            info = info.push_next(&mut features);
+            if takes_settings(&entry) {
+                info = info.push_next(&mut layer_settings);
+            }
         }
         // SAFETY: every pointer in the description is alive.
         let raw = unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
