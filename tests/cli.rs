@@ -1,158 +1,231 @@
-//! The command line from outside: exit status, messages, files.
+//! Bad input to the program: each gives a clear error that names field, value and expectation, exit status 2, and leaves no
+//! file or part of one.
 mod support;
 
+use std::fs;
 use std::path::Path;
-use std::process::Output;
-use support::{stderr, stdout, welkin};
+use std::process::{Command, Output};
+use support::{Driver, drivers, root, stderr, welkin, welkin_on};
 
-/// A scene that needs no tables: one ellipsoid of its own colour before black.
-const FLAT: &str = r#"
+/// A scene that renders in a moment: one opaque ball, no tables.
+const BALL: &str = r#"
     [camera]
     position = [0, 0, 0]
+    yaw = 0
     pitch = 0
     [clouds]
     source = "particles"
     lighting = "flat"
     style = "homogeneous"
     [[clouds.particle]]
-    centre = [0, 0, -500]
-    radii = [100, 50, 100]
+    centre = [0, 0, -100]
+    radii = [20, 20, 20]
     [quality]
     downscale = 1
     [sky]
     model = "none"
-    [animation]
-    velocity = [0, 0, -20]
 "#;
 
-/// A directory of its own for a test, with `sky.toml` in it.
-fn directory(scene: &str) -> tempfile::TempDir {
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("sky.toml"), scene).unwrap();
-    directory
+/// A folder for one run: the scene in it, and what a run may leave.
+struct Bench {
+    folder: tempfile::TempDir,
 }
 
-/// Runs `welkin` with the words of `line` in `directory`.
-fn run(directory: &Path, line: &str) -> Output {
-    welkin().args(line.split_whitespace()).current_dir(directory).output().expect("welkin starts")
-}
+impl Bench {
+    fn new(scene: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("scene.toml"), scene).unwrap();
+        Self { folder }
+    }
 
-/// Names in `directory` other than the scene's.
-fn files(directory: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(directory).unwrap();
-    let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.retain(|name| name != "sky.toml");
-    names.sort();
-    names
+    fn path(&self, name: &str) -> String {
+        self.folder.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    /// `welkin render scene.toml -o out.png --size 32x32` with `arguments` added.
+    fn render(&self, arguments: &[&str]) -> Output {
+        self.start(welkin(), arguments)
+    }
+
+    fn start(&self, mut command: Command, arguments: &[&str]) -> Output {
+        command.args(["render", &self.path("scene.toml")]);
+        if !arguments.contains(&"-o") {
+            command.args(["-o", &self.path("out.png")]);
+        }
+        if !arguments.iter().any(|argument| argument.starts_with("--size")) {
+            command.args(["--size", "32x32"]);
+        }
+        command.args(arguments).output().unwrap()
+    }
+
+    /// Every file but the scene.
+    fn left(&self) -> Vec<String> {
+        let names = fs::read_dir(self.folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name != "scene.toml").collect()
+    }
+
+    /// The run failed as it must: status 2, a message with each of `parts`, nothing left that was not in `had`.
+    fn assert_refused(&self, output: &Output, parts: &[&str], had: &[&str]) {
+        let message = stderr(output);
+        assert_eq!(output.status.code(), Some(2), "{parts:?}: {message}");
+        assert!(!message.contains("panicked"), "{message}");
+        for part in parts {
+            assert!(message.contains(part), "{part:?} is not in {message:?}");
+        }
+        let mut left = self.left();
+        left.retain(|name| !had.contains(&name.as_str()));
+        assert!(left.is_empty(), "{parts:?} left {left:?}");
+    }
 }
 
 #[test]
-fn bad_input_is_status_2_with_a_reason_and_leaves_no_file() {
-    let cases = [
-        ("[clouds]\ncovrage = 1", "", "sky.toml:2:1: clouds.covrage: expected a known key"),
-        ("[clouds]\ncoverage = \"x\"", "", "sky.toml:2:12: clouds.coverage = \"x\": expected a number"),
-        ("[clouds]\ncoverage = nan", "", "sky.toml:2:12: clouds.coverage = NaN: expected a number from 0.0 to 1.0"),
-        ("[clouds]\nthickness = -5", "", "sky.toml:2:13: clouds.thickness = -5: expected a number above 0"),
-        ("[clouds]\nlighting = \"march\"", "", "clouds.lighting = \"march\" is not supported by this version yet"),
-        ("[sky]\nground = \"a.png\"", "", "is not supported by this version yet"),
-        ("[clouds]\nsource = \"particles\"\nfile = \"c.csv\"", "", "c.csv: cannot be read: "),
-        ("[clouds]\ncoverage_map = \"m.png\"", "", "m.png: cannot be read: "),
-        ("", "--size 0x0", "'0x0' for '--size <WxH>': expected WIDTHxHEIGHT"),
-        ("", "--size 100000x100000", "'100000x100000' for '--size <WxH>': expected WIDTHxHEIGHT"),
-        ("", "--blend glass", "'glass' for '--blend <MODE[:K]>': expected one of auto"),
-        ("", "--blend tiled", "--blend \"tiled\" is not supported by this version yet"),
-        ("", "--set clouds.coverage=7", "--set clouds.coverage = 7: expected a number from 0.0 to 1.0"),
-        ("", "--device no-such-device", "--device = no-such-device: expected"),
-        ("", "--frames 3..1", "'3..1' for '--frames <A..B>': expected A..B"),
-        ("", "-o sky.jpg", "sky.jpg: names no picture format"),
-        ("", "-o no/such/sky.png", "there is no directory no/such"),
-        ("", "more.toml", "more.toml: cannot be read: "),
+fn a_good_scene_renders() {
+    let bench = Bench::new(BALL);
+    let output = bench.render(&[]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(bench.left(), ["out.png"]);
+}
+
+#[test]
+fn faults_of_the_scene_name_place_field_value_and_expectation() {
+    let cases: [(&str, &[&str]); 14] = [
+        ("[clouds]\ncovrage = 0.5", &["scene.toml:2:1", "clouds.covrage", "known key"]),
+        ("[weather]\nwind = 3", &["scene.toml:1:2", "weather", "known key"]),
+        ("[clouds]\ncoverage = \"lots\"", &["scene.toml:2:12", "clouds.coverage", "lots", "a number"]),
+        ("[clouds]\nseed = 1.5", &["scene.toml:2:8", "clouds.seed", "1.5", "whole number"]),
+        ("[camera]\nposition = [0, 1]", &["scene.toml:2:12", "camera.position", "3 numbers"]),
+        ("[clouds]\nsigma_t = nan", &["scene.toml:2:11", "clouds.sigma_t", "NaN", "expected"]),
+        ("[camera]\nposition = [0, nan, 0]", &["camera.position[1]", "NaN", "expected"]),
+        ("[clouds]\naltitude = inf", &["clouds.altitude", "inf", "expected"]),
+        ("[clouds]\nthickness = -700", &["scene.toml:2:13", "clouds.thickness", "-700", "above 0"]),
+        ("[clouds]\nstyle = \"fluffy\"", &["clouds.style", "fluffy", "one of", "pyroclastic"]),
+        ("[quality]\npreset = \"ultra\"", &["quality.preset", "ultra", "one of", "medium"]),
+        ("[quality]\nrings = 4000000000", &["quality.rings", "4000000000", "from 1 to 8"]),
+        ("[clouds\n", &["scene.toml:1:8", "not TOML"]),
+        ("[clouds]\nsource = \"particles\"\nfile = \"none.csv\"", &["none.csv", "cannot be read", "clouds.file"]),
     ];
-    for (scene, flags, expected) in cases {
-        let directory = directory(scene);
-        let output = run(directory.path(), &format!("render sky.toml {flags}"));
-        let message = stderr(&output);
-        assert_eq!(output.status.code(), Some(2), "{scene:?} {flags}: {message}");
-        assert!(message.contains(expected), "{scene:?} {flags} gave {message:?}, not {expected:?}");
-        assert!(stdout(&output).is_empty());
-        assert!(files(directory.path()).is_empty(), "{flags} left {:?}", files(directory.path()));
+    for (scene, parts) in cases {
+        let bench = Bench::new(scene);
+        bench.assert_refused(&bench.render(&[]), parts, &[]);
     }
 }
 
 #[test]
-fn devices_says_why_a_mode_cannot_be_used() {
-    let directory = directory("");
-    let output = run(directory.path(), "devices --json");
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
-    let devices = report["devices"].as_array().unwrap();
-    assert!(!devices.is_empty());
-    for mode in devices.iter().flat_map(|device| device["blend"].as_array().unwrap()) {
-        assert_ne!(mode["supported"].as_bool().unwrap(), mode["reason"].is_string(), "{mode}");
+fn a_scene_that_is_no_text_or_is_not_there_is_named() {
+    let bench = Bench::new("");
+    fs::write(bench.path("scene.toml"), [0xff, 0xfe, 0, 1]).unwrap();
+    bench.assert_refused(&bench.render(&[]), &["scene.toml", "UTF-8"], &[]);
+    fs::remove_file(bench.path("scene.toml")).unwrap();
+    bench.assert_refused(&bench.render(&[]), &["scene.toml", "cannot be read"], &[]);
+    fs::create_dir(bench.path("scene.toml")).unwrap();
+    bench.assert_refused(&bench.render(&[]), &["scene.toml", "cannot be read"], &[]);
+}
+
+#[test]
+fn damaged_pictures_and_lists_are_named() {
+    let bench = Bench::new("[clouds]\ncoverage_map = \"map.png\"\n");
+    bench.assert_refused(&bench.render(&[]), &["map.png", "cannot be read", "clouds.coverage_map"], &[]);
+    fs::write(bench.path("map.png"), b"\x89PNG\r\n\x1a\nand then nothing of the kind").unwrap();
+    bench.assert_refused(&bench.render(&[]), &["map.png", "picture", "clouds.coverage_map"], &["map.png"]);
+
+    let bench = Bench::new("[clouds]\nsource = \"particles\"\nfile = \"list.csv\"\n");
+    fs::write(bench.path("list.csv"), "0,0,0,1,1,1,0,0,0,1,1\n0,0,0,1,nan,1,0,0,0,1,1\n").unwrap();
+    bench.assert_refused(&bench.render(&[]), &["list.csv:2:1", "radii[1]", "NaN", "expected"], &["list.csv"]);
+}
+
+#[test]
+fn faults_of_the_flags_name_flag_value_and_expectation() {
+    let cases: [(&[&str], &[&str]); 20] = [
+        (&["--size", "0x0"], &["--size", "0x0", "from 1 to"]),
+        (&["--size", "100000x100000"], &["--size", "100000x100000", "from 1 to 16384"]),
+        (&["--size", "4000000000x4000000000"], &["--size", "4000000000"]),
+        (&["--size=-5x5"], &["--size", "-5x5"]),
+        (&["--size", "640"], &["--size", "640", "expected WIDTHxHEIGHT"]),
+        (&["--size", "axb"], &["--size", "axb"]),
+        (&["--quality", "ultra"], &["--quality", "ultra", "medium"]),
+        (&["--blend", "glass"], &["--blend", "glass", "interlock"]),
+        (&["--blend", "alpha:4"], &["--blend", "alpha:4"]),
+        (&["--blend", "interlock:3"], &["blend", "interlock:3", "1, 2, 4 or 8"]),
+        (&["--device", "No Such Device"], &["--device", "No Such Device", "expected part of the name"]),
+        (&["--device", "99"], &["--device", "99", "index"]),
+        (&["--frames", "5..2"], &["--frames", "5..2", "A below B"]),
+        (&["--frames", "x"], &["--frames", "x"]),
+        (&["--set", "clouds.coverage=7"], &["--set", "clouds.coverage", "7", "0.0 to 1.0"]),
+        (&["--set", "clouds.coverage=nan"], &["--set", "clouds.coverage", "expected a number"]),
+        (&["--set", "clouds.covrage=0"], &["--set", "clouds.covrage", "known key"]),
+        (&["--set", "coverage"], &["--set", "coverage", "key=value"]),
+        (&["--colour"], &["--colour"]),
+        (&["--stats", "/nowhere/at/all.json"], &["/nowhere/at/all.json", "no directory"]),
+    ];
+    for (arguments, parts) in cases {
+        let bench = Bench::new(BALL);
+        bench.assert_refused(&bench.render(arguments), parts, &[]);
     }
-    assert!(stdout(&run(directory.path(), "devices")).contains("interlock"));
 }
 
 #[test]
-fn a_picture_its_transmittance_and_its_statistics() {
-    let directory = directory(FLAT);
-    let line = "render sky.toml -o a.exr --size 40x30 --aux --stats s.json";
-    let output = run(directory.path(), line);
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert_eq!(files(directory.path()), ["a.exr", "a.transmittance.npy", "s.json"]);
-
-    let picture = image::open(directory.path().join("a.exr")).unwrap().to_rgb32f();
-    assert_eq!(picture.dimensions(), (40, 30));
-    // Through the middle of the ellipsoid τ = 0.07 · 200, so its colour is all there is: Eq. 8 with T = 8e-7.
-    assert!(picture.get_pixel(20, 15).0.iter().all(|v| (v - 1.0).abs() < 1e-3), "f16 targets hold 3 digits");
-    assert_eq!(picture.get_pixel(0, 0).0, [0.0; 3]);
-
-    let bytes = std::fs::read(directory.path().join("a.transmittance.npy")).unwrap();
-    let transmittance = npyz::NpyFile::new(&bytes[..]).unwrap();
-    assert_eq!(transmittance.shape(), [30, 40]);
-    let transmittance = transmittance.into_vec::<f32>().unwrap();
-    assert_eq!(transmittance[0], 1.0);
-    assert!(transmittance[15 * 40 + 20] < 1e-3);
-
-    let stats: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(directory.path().join("s.json")).unwrap()).unwrap();
-    assert_eq!(stats["particles"]["generated"], 1);
-    assert_eq!(stats["particles"]["visible"], 1);
-    assert_eq!(stats["blend"]["requested"], "auto");
-    assert!(stats["blend"]["used"] == "interlock" || stats["blend"]["reason"].as_str().unwrap().contains("interlock"));
-    assert_eq!(stats["validation_messages"], 0);
-    assert!(!stats["passes"].as_array().unwrap().is_empty());
+fn places_that_cannot_be_written_are_named_before_anything_is_made() {
+    let bench = Bench::new(BALL);
+    let nowhere = bench.path("none/out.png");
+    bench.assert_refused(&bench.render(&["-o", &nowhere]), &["none/out.png", "no directory"], &[]);
+    let jpeg = bench.path("out.jpg");
+    bench.assert_refused(&bench.render(&["-o", &jpeg]), &["out.jpg", ".png, .exr or .npy"], &[]);
 }
 
 #[test]
-fn a_sequence_is_numbered_and_moves() {
-    let directory = directory(FLAT);
-    let output = run(directory.path(), "render sky.toml -o a.npy --size 160x80 --frames 3..5");
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert_eq!(files(directory.path()), ["a.0003.npy", "a.0004.npy"]);
-    let read = |name| std::fs::read(directory.path().join(name)).unwrap();
-    assert!(read("a.0003.npy") != read("a.0004.npy"), "the camera moved 20 m, the picture did not change");
+fn a_blend_mode_that_the_device_lacks_is_refused_with_the_reason() {
+    if !drivers().contains(&Driver::Distro) {
+        return eprintln!("skipped: no device without interlock here");
+    }
+    let probe = Command::new(root().join("scripts/runner"))
+        .arg(root().join(".welkin/probe"))
+        .env("WELKIN_DRIVER", "distro")
+        .output()
+        .unwrap();
+    if support::stdout(&probe).contains("cpu interlock") {
+        return eprintln!("skipped: the distribution's own lavapipe has interlock");
+    }
+    let bench = Bench::new(BALL);
+    let output = bench.start(welkin_on(Driver::Distro), &["--blend", "interlock"]);
+    bench.assert_refused(&output, &["interlock", "VK_EXT_fragment_shader_interlock"], &[]);
+    let output = bench.start(welkin_on(Driver::Distro), &[]);
+    assert!(output.status.success(), "auto falls back: {}", stderr(&output));
 }
 
 #[test]
-fn several_scenes_go_into_a_directory_with_one_list_of_statistics() {
-    let directory = directory(FLAT);
-    std::fs::write(directory.path().join("b.toml"), FLAT).unwrap();
-    let output = run(directory.path(), "render sky.toml b.toml -o out/ --size 16x8 --stats");
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert_eq!(files(&directory.path().join("out")), ["b.png", "sky.png"]);
-    let stats: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
-    assert_eq!(stats.as_array().unwrap().len(), 2);
+fn a_full_disk_is_an_error_and_leaves_nothing() {
+    // A file system of 16 KiB in a mount namespace of our own, which needs no root where the kernel allows it.
+    let possible = Command::new("unshare").args(["-rm", "mount", "-t", "tmpfs", "tmpfs", "/mnt"]).output();
+    if !possible.is_ok_and(|output| output.status.success()) {
+        return eprintln!("skipped: no mount namespace here; output::write_atomic has a test of its own");
+    }
+    let bench = Bench::new(BALL);
+    let disk = bench.path("disk");
+    fs::create_dir(&disk).unwrap();
+    let script = r#"
+        mount -t tmpfs -o size=16k tmpfs "$0" || exit 99
+        "$@"; status=$?
+        ls -A "$0"
+        exit $status
+    "#;
+    let runner = root().join("scripts/runner");
+    let out = Path::new(&disk).join("out.npy");
+    let output = Command::new("unshare")
+        .args(["-rm", "sh", "-c", script, &disk])
+        .arg(runner)
+        .args([env!("CARGO_BIN_EXE_welkin"), "render", &bench.path("scene.toml"), "--size", "64x64", "-o"])
+        .arg(out) // 64² pixels of 12 bytes: three times what there is room for
+        .output()
+        .unwrap();
+    bench.assert_refused(&output, &["out.npy", "cannot be written", "space"], &["disk"]);
+    assert_eq!(support::stdout(&output).trim(), "", "left on the full disk");
 }
 
 #[test]
-fn bench_compares_two_modes_in_one_run() {
-    let directory = directory(FLAT);
-    let line = "bench sky.toml --size 32x16 --blend alpha --vs alpha --measure 2 --warmup 1 --json";
-    let output = run(directory.path(), line);
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
-    assert_eq!(report["a"]["blend"]["used"], "alpha");
-    assert!(report["ratio"]["frame"].as_f64().unwrap() > 0.0);
-    assert!(report["a"]["passes"][0]["median_ms"].as_f64().unwrap() >= 0.0);
+fn an_unknown_command_is_an_error() {
+    for arguments in [&["paint"][..], &["render"], &[]] {
+        let output = welkin().args(arguments).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(stderr(&output).contains("Usage"), "{}", stderr(&output));
+    }
 }

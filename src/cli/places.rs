@@ -14,13 +14,8 @@ pub fn pictures(scenes: &[PathBuf], output: Option<&Path>) -> Result<Vec<PathBuf
         && !is_directory(file)
     {
         Format::of(file)?;
-        let directory = file.parent().filter(|parent| !parent.as_os_str().is_empty());
-        return match directory {
-            Some(directory) if !directory.is_dir() => {
-                Err(Error::file(file, format!("cannot be written: there is no directory {}", directory.display())))
-            }
-            _ => Ok(vec![file.to_owned()]),
-        };
+        in_directory(file)?;
+        return Ok(vec![file.to_owned()]);
     }
     let directory = output.unwrap_or(Path::new(""));
     if scenes.len() > 1 && output.is_some() && !is_directory(directory) {
@@ -45,6 +40,16 @@ pub fn pictures(scenes: &[PathBuf], output: Option<&Path>) -> Result<Vec<PathBuf
             .map_err(|error| Error::file(directory, format!("cannot be made: {error}")))?;
     }
     Ok(pictures)
+}
+
+/// The directory that `file` is to be written in is there.
+pub fn in_directory(file: &Path) -> Result<()> {
+    match file.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        Some(directory) if !directory.is_dir() => {
+            Err(Error::file(file, format!("cannot be written: there is no directory {}", directory.display())))
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

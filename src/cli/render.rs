@@ -21,6 +21,7 @@ struct Job<'a> {
 
 pub fn run(args: &RenderArgs) -> Result<()> {
     let outputs = places::pictures(&args.scenes, args.output.as_deref())?;
+    args.stats.as_deref().map_or(Ok(()), places::in_directory)?;
     let jobs = args
         .scenes
         .iter()
