@@ -14,7 +14,7 @@ use std::path::Path;
 pub use atomic::write_atomic;
 pub use picture::{Format, Picture, PngDepth, numbered, transmittance_path};
 pub use stats::{BlendStats, CapacityStats, DeviceStats, FrameStats, ParticleStats, PassStats, Stats, TableStats};
-pub use table::{Axis, Table, write_tables};
+pub use table::{Axis, AxisValues, Table, write_tables};
 
 use crate::{Error, Result};
 

@@ -15,7 +15,32 @@ pub struct Axis {
     /// Unit of the values; `1` for a pure number.
     pub unit: String,
     /// The value at each index.
-    pub values: Vec<f64>,
+    pub values: AxisValues,
+}
+
+/// The values of an axis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum AxisValues {
+    /// The same wherever one stands: a plain list in JSON.
+    Fixed(Vec<f64>),
+    /// Other ones at each index of another axis: `{"per": "optical_radius", "values": [[…], …]}` in JSON.
+    Per {
+        /// Name of the other axis.
+        per: String,
+        /// A list for each of its indices, all of one length.
+        values: Vec<Vec<f64>>,
+    },
+}
+
+impl AxisValues {
+    /// Number of indices of the axis.
+    fn count(&self) -> usize {
+        match self {
+            Self::Fixed(values) => values.len(),
+            Self::Per { values, .. } => values.first().map_or(0, Vec::len),
+        }
+    }
 }
 
 /// An n-dimensional table.
@@ -51,7 +76,7 @@ struct Entry<'a> {
 impl Table {
     fn shape(&self) -> Vec<u64> {
         let components = (!self.components.is_empty()).then_some(self.components.len() as u64);
-        self.axes.iter().map(|axis| axis.values.len() as u64).chain(components).collect()
+        self.axes.iter().map(|axis| axis.values.count() as u64).chain(components).collect()
     }
 }
 
@@ -92,12 +117,13 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        let axis = |name: &str, values: &[f64]| Axis { name: name.into(), unit: "1".into(), values: values.into() };
+        let axis = |name: &str, values| Axis { name: name.into(), unit: "1".into(), values };
+        let per_u = AxisValues::Per { per: "u".into(), values: vec![vec![0.0, 0.5, 1.0], vec![0.0, 0.1, 1.0]] };
         Table {
             name: "depth".into(),
             quantity: "mean density".into(),
             unit: "1".into(),
-            axes: vec![axis("u", &[0.0, 1.0]), axis("v", &[0.0, 0.5, 1.0])],
+            axes: vec![axis("u", AxisValues::Fixed(vec![0.0, 1.0])), axis("v", per_u)],
             components: vec!["mean".into(), "first".into()],
             values: (0..12).map(|i| i as f32).collect(),
         }
@@ -117,7 +143,9 @@ mod tests {
         assert_eq!(index["parameters"]["g"], 0.9);
         assert_eq!(index["tables"][0]["file"], "depth.npy");
         assert_eq!(index["tables"][0]["shape"], serde_json::json!([2, 3, 2]));
-        assert_eq!(index["tables"][0]["axes"][1]["values"], serde_json::json!([0.0, 0.5, 1.0]));
+        assert_eq!(index["tables"][0]["axes"][0]["values"], serde_json::json!([0.0, 1.0]));
+        let per_u = serde_json::json!({"per": "u", "values": [[0.0, 0.5, 1.0], [0.0, 0.1, 1.0]]});
+        assert_eq!(index["tables"][0]["axes"][1]["values"], per_u);
     }
 
     #[test]
