@@ -3,6 +3,7 @@
 pub mod atmosphere;
 pub mod compact;
 pub mod density;
+pub mod detail;
 pub mod grid;
 pub mod lighting;
 pub mod monte_carlo;
