@@ -12,6 +12,7 @@ struct CellPlace {
 
 struct CellShape {
     uint layers;     // 0: no cloud
+    uint puffs;      // small billows on top of them
     float height;    // of the column [m]
     float body;      // 0 at a cloud's outline, 1 well inside
     float weight;    // level-of-detail cross-fade, 0..1
@@ -85,9 +86,22 @@ float coverage_threshold(float coverage, in GridParams p) {
     return result;
 }
 
+// Layer that carries a puff with hash `id`.
+uint puff_host(uint id, CellShape shape) {
+    return shape.body < 1.0 ? id % shape.layers : shape.layers - 1u;
+}
+
+// Two counts in one float of the cell's record, exact.
+float pack_counts(CellShape shape) { return float(shape.layers + 64u * shape.puffs); }
+
+CellShape unpack_shape(vec4 stored) {
+    uint counts = uint(stored.w);
+    return CellShape(counts % 64u, counts / 64u, stored.x, stored.y, stored.z);
+}
+
 // The column on a cell. `coverage` is the wanted share of covered area around the cell.
 CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
-    CellShape shape = CellShape(0u, 0.0, 0.0, 0.0);
+    CellShape shape = CellShape(0u, 0u, 0.0, 0.0, 0.0);
     shape.weight = ring_weight(place.centre, place.ring, p);
     if (!(shape.weight > 0.0) || !(coverage > 0.0)) return shape;
     int steps = p.ring_first[place.ring].w;
@@ -97,7 +111,7 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
     precise float excess = field - coverage_threshold(coverage, p);
     if (!(excess > 0.0)) return shape;
     // The column rises steeply from the outline, then follows the turrets: 2t - t² has a vertical-looking shoulder.
-    precise float inside = min(excess * 1.15, 1.0);
+    precise float inside = min(excess * 1.0, 1.0);
     precise float inside_left = 1.0 - inside;
     precise float inside_squared = inside_left * inside_left;
     precise float shoulder = 1.0 - inside_squared;
@@ -110,8 +124,10 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
     precise float height = fraction * p.thickness;
     precise float steps_up = height * p.ring_layer[place.ring].y;
     shape.layers = uint(clamp(int(ceil(steps_up)), 1, p.ring_first[place.ring].z));
-    shape.height = height;
     shape.body = min(excess * 3.0, 1.0);
+    // Billows where a cell is near enough to show them: two at the outline, one inside.
+    if (p.ring_frame[place.ring].z < 400.0) shape.puffs = shape.body < 1.0 ? 2u : 1u;
+    shape.height = height;
     return shape;
 }
 

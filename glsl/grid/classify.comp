@@ -9,8 +9,8 @@ layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, std430) readonly restrict buffer GridParamsBuffer { GridParams grid; } params;
 layout(set = 0, binding = 1, std430) readonly restrict buffer CoverageMap { float texel[]; } coverage_map; // row 0 at least z
 layout(set = 0, binding = 2, std430) restrict buffer CountersBuffer { Counters count; } counters;
-layout(set = 0, binding = 3, std430) writeonly restrict buffer CellLayers { uint layers[]; } cell_layers;
-layout(set = 0, binding = 4, std430) writeonly restrict buffer CellShapes { vec4 shape[]; } cell_shapes; // height, body, weight, layers
+layout(set = 0, binding = 3, std430) writeonly restrict buffer CellParticles { uint count[]; } cell_particles;
+layout(set = 0, binding = 4, std430) writeonly restrict buffer CellShapes { vec4 shape[]; } cell_shapes; // height, body, weight, counts
 layout(set = 0, binding = 5, std430) writeonly restrict buffer ValidCells { uint cell[]; } valid_cells;
 
 float map_texel(int x, int z) {
@@ -48,8 +48,8 @@ void main() {
     if (cell_id >= params.grid.ring_count * params.grid.ring_dim * params.grid.ring_dim) return;
     CellPlace place = cell_place(cell_id, params.grid);
     CellShape shape = cell_shape(place, coverage_at(place), params.grid);
-    cell_layers.layers[cell_id] = shape.layers;
-    cell_shapes.shape[cell_id] = vec4(shape.height, shape.body, shape.weight, float(shape.layers));
+    cell_particles.count[cell_id] = shape.layers + shape.puffs;
+    cell_shapes.shape[cell_id] = vec4(shape.height, shape.body, shape.weight, pack_counts(shape));
     if (shape.layers > 0u) {
         // Counts past capacity, so the host reads the true need. The order is arbitrary; the slot of a particle comes
         // from a prefix sum over cells, so nothing downstream depends on it.

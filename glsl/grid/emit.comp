@@ -18,14 +18,13 @@ void main() {
     uint index = linear_index();
     if (index >= min(counters.count.valid_cells, params.grid.valid_cell_capacity)) return;
     uint cell_id = valid_cells.cell[index];
-    vec4 stored = cell_shapes.shape[cell_id];
-    CellShape shape = CellShape(uint(stored.w), stored.x, stored.y, stored.z);
+    CellShape shape = unpack_shape(cell_shapes.shape[cell_id]);
     CellPlace place = cell_place(cell_id, params.grid);
     uint first = cell_first.first[cell_id];
-    for (uint layer = 0u; layer < shape.layers; ++layer) {
-        uint slot = first + layer;
+    for (uint index = 0u; index < shape.layers + shape.puffs; ++index) {
+        uint slot = first + index;
         if (slot >= params.grid.particle_capacity) return; // counted by args.comp; the list grows before the next frame
-        particles.particle[slot] = column_particle(place, shape, layer, params.grid);
-        particle_cells.cell_and_layer[slot] = cell_id << 5u | layer;
+        particles.particle[slot] = column_particle(place, shape, index, params.grid);
+        particle_cells.cell_and_layer[slot] = cell_id << 5u | index;
     }
 }

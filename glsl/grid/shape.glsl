@@ -14,37 +14,76 @@ float base_height(vec2 from_camera, in GridParams p) {
     return p.altitude - dot(from_camera, from_camera) * p.inverse_diameter;
 }
 
-// Particle `layer` of the column, counted from its base. Rounding differs between devices only here and below, where
-// no decision hangs on it.
-Particle column_particle(CellPlace place, CellShape shape, uint layer, in GridParams p) {
-    uint id = pcg(hash_lattice(place.absolute, p.seed + 16u + place.ring) + layer * 0x9e3779b9u);
-    uint h0 = pcg(id), h1 = pcg(h0), h2 = pcg(h1), h3 = pcg(h2), h4 = pcg(h3), h5 = pcg(h4), h6 = pcg(h5);
+// A column's ball before it is turned: centre, and its half sizes across and upwards.
+struct Ball {
+    vec3 centre;
+    float across;
+    float tall;
+    uint id;
+    uint hash; // what is left of its randomness
+};
+
+// Ball `layer` of the column, counted from its base. Rounding differs between devices only here and below, where no
+// decision hangs on it.
+Ball column_ball(CellPlace place, CellShape shape, uint layer, in GridParams p) {
+    Ball ball;
+    ball.id = pcg(hash_lattice(place.absolute, p.seed + 16u + place.ring) + layer * 0x9e3779b9u);
+    uint h0 = pcg(ball.id), h1 = pcg(h0), h2 = pcg(h1), h3 = pcg(h2), h4 = pcg(h3);
+    ball.hash = pcg(h4);
     float edge = p.ring_frame[place.ring].z;
     float step = shape.height / float(shape.layers);
     float up = (float(layer) + 0.5) / float(shape.layers);
 
-    // Narrow tops, wide bottoms; small at the outline. A layer's step is 0.9 of its particles' height.
+    // Narrow tops, wide bottoms; small at the outline, and a few much larger than the others: billows of many sizes.
+    // A layer's step is 0.9 of its particles' height.
     float taper = 1.0 - 0.42 * up * up;
     float outline = 0.55 + 0.45 * shape.body;
-    float size = taper * outline * (0.85 + 0.35 * unit_float(h0));
-    float across = edge * 0.74 * size;
+    float rare = float(h0 & 255u) / 256.0;
+    float size = 0.8 + 0.3 * unit_float(h0) + 0.45 * (rare * rare) * (rare * rare);
+    ball.across = edge * 0.74 * taper * outline * size;
     float tall = 0.5 * step / 0.9 * (0.95 + 0.3 * unit_float(h1));
-    vec3 semi_axes = vec3(across * (0.88 + 0.24 * unit_float(h2)), max(tall, 0.35 * across), across);
+    ball.tall = max(tall, 0.35 * ball.across);
 
     // Horizontal jitter ±0.4 cells, vertical ±0.15 of the height; the lowest layer stays near its plane.
     float jitter = layer == 0u ? 0.03 : 0.15;
-    vec2 offset = vec2(signed_float(h3), signed_float(h4)) * (0.4 * edge);
-    vec2 xz = place.centre + offset;
-    float y = base_height(xz - p.camera.xz, p) + (float(layer) + 0.5) * step + signed_float(h5) * jitter * 2.0 * tall;
+    vec2 xz = place.centre + vec2(signed_float(h2), signed_float(h3)) * (0.4 * edge);
+    float y = base_height(xz - p.camera.xz, p) + (float(layer) + 0.5) * step + signed_float(h4) * jitter * 2.0 * tall;
+    ball.centre = vec3(xz.x, y, xz.y);
+    return ball;
+}
+
+// A billow on the upper side of one of the column's balls: the top one well inside the cloud, any at the outline.
+Ball puff_ball(CellPlace place, CellShape shape, uint index, in GridParams p) {
+    uint id = pcg(hash_lattice(place.absolute, p.seed + 16u + place.ring) + index * 0x9e3779b9u);
+    uint h0 = pcg(id), h1 = pcg(h0), h2 = pcg(h1), h3 = pcg(h2);
+    Ball host = column_ball(place, shape, puff_host(id, shape), p);
+    vec3 side = normalize(vec3(signed_float(h0), 0.15 + unit_float(h1), signed_float(h2)));
+    Ball ball;
+    ball.id = id;
+    ball.hash = pcg(h3);
+    ball.across = host.across * (0.42 + 0.26 * unit_float(h3));
+    ball.tall = ball.across * 0.9;
+    ball.centre = host.centre + side * vec3(host.across, host.tall, host.across) * 0.82;
+    return ball;
+}
+
+// Particle `index` of the column: its layers from the base up, then its puffs.
+Particle column_particle(CellPlace place, CellShape shape, uint index, in GridParams p) {
+    bool puff = index >= shape.layers;
+    Ball ball;
+    if (puff) ball = puff_ball(place, shape, index, p);
+    else ball = column_ball(place, shape, index, p);
+    uint h0 = ball.hash, h1 = pcg(h0), h2 = pcg(h1);
+    vec3 semi_axes = vec3(ball.across * (0.88 + 0.24 * unit_float(h1)), ball.tall, ball.across);
 
     // Random yaw, a random one of the three axes upright, a small tilt. Half-angle tangent in [-1, 1): every yaw, no
     // trigonometry.
-    float t = signed_float(h6);
+    float t = signed_float(h2);
     vec4 yaw = vec4(0.0, 2.0 * t, 0.0, 1.0 - t * t) / (1.0 + t * t);
-    vec4 tilt = normalize(vec4(0.16 * signed_float(pcg(h6)), 0.0, 0.16 * signed_float(pcg(h6 + 1u)), 1.0));
+    vec4 tilt = normalize(vec4(0.16 * signed_float(pcg(h2)), 0.0, 0.16 * signed_float(pcg(h2 + 1u)), 1.0));
     vec4 rotation = quaternion_multiply(tilt, yaw);
     const float HALF_ROOT = 0.70710678;
-    uint upright = h5 % 3u;
+    uint upright = h0 % 3u;
     if (upright == 1u) { // local z up: a quarter turn about x swaps y and z
         rotation = quaternion_multiply(rotation, vec4(HALF_ROOT, 0.0, 0.0, HALF_ROOT));
         semi_axes = semi_axes.xzy;
@@ -54,13 +93,13 @@ Particle column_particle(CellPlace place, CellShape shape, uint layer, in GridPa
     }
 
     Particle particle;
-    particle.centre = vec3(xz.x, y, xz.y);
+    particle.centre = ball.centre;
     particle.density = p.density * (0.35 + 0.65 * shape.body);
     particle.rotation = rotation;
     particle.semi_axes = semi_axes;
     particle.fade = shape.weight;
     particle.colour = vec3(1.0);
-    particle.id = id;
+    particle.id = ball.id;
     return particle;
 }
 

@@ -1,11 +1,11 @@
 // Diffusion of light in the body of a cloud: a low-pass filter of the sun's transmittance over a particle and its six
 // neighbours in the grid, weighted with their density, and the share of the sky that the particle sees. Yusov 5.3, step 3.
-// Every layer has both its neighbours, layer 1 its lower one too (which Yusov's released code skips).
+// Every layer has both its neighbours, layer 1 its lower one too (which Yusov's released code skips). A puff has the ball
+// that carries it.
 // Explicit particles have no neighbours in a grid: no smoothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "grid/params.glsl"
-#include "common/particle.glsl"
+#include "grid/shape.glsl"
 #include "grid/counters.glsl"
 #include "compact/index.glsl"
 #include "lighting/sky.glsl"
@@ -41,24 +41,30 @@ void main() {
         uint cell = packed_cell >> 5u, layer = packed_cell & 31u;
         uint dim = params.grid.ring_dim;
         ivec2 local = ivec2(int(cell % dim), int(cell / dim % dim));
-        vec4 shape = cell_shapes.shape[cell];
-        uint layers = uint(shape.w);
-        float height = (float(layer) + 0.5) * shape.x / shape.w;
+        CellShape shape = unpack_shape(cell_shapes.shape[cell]);
+        Particle particle = particles.particle[index];
+        float height = particle.centre.y - base_height(particle.centre.xz - params.grid.camera.xz, params.grid);
         float weighted = 0.0, weights = 0.0, open = 0.0;
         add(index, 1.0, weighted, weights);
-        if (layer > 0u) add(index - 1u, push.smoothing, weighted, weights);
-        if (layer + 1u < layers) add(index + 1u, push.smoothing, weighted, weights);
+        bool puff = layer >= shape.layers;
+        if (puff) {
+            layer = puff_host(particle.id, shape);
+            add(cell_first.first[cell] + layer, push.smoothing, weighted, weights);
+        } else {
+            if (layer > 0u) add(index - 1u, push.smoothing, weighted, weights);
+            if (layer + 1u < shape.layers) add(index + 1u, push.smoothing, weighted, weights);
+        }
         for (int dz = -1; dz <= 1; ++dz) {
             for (int dx = -1; dx <= 1; ++dx) {
                 ivec2 other = local + ivec2(dx, dz);
                 if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, ivec2(int(dim))))) {
-                    open += sky_openness(shape.x - height); // beyond the ring: like here
+                    open += sky_openness(shape.height - height); // beyond the ring: like here
                     continue;
                 }
                 uint neighbour = uint(int(cell) + dz * int(dim) + dx);
-                vec4 neighbour_shape = cell_shapes.shape[neighbour];
-                open += sky_openness(neighbour_shape.x - height);
-                if (abs(dx) + abs(dz) == 1 && layer < uint(neighbour_shape.w)) {
+                CellShape there = unpack_shape(cell_shapes.shape[neighbour]);
+                open += sky_openness(there.height - height);
+                if (!puff && abs(dx) + abs(dz) == 1 && layer < there.layers) {
                     add(cell_first.first[neighbour] + layer, push.smoothing, weighted, weights);
                 }
             }

@@ -75,3 +75,39 @@ pub fn coverage_curve(f: FieldFrequencies, step: f64, seed: u32) -> [f32; 68] {
     }
     curve
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::density::pcg;
+
+    /// Share of random places whose field exceeds the threshold for `coverage`.
+    fn covered(coverage: f32, step: f64, seed: u32) -> f64 {
+        let f = Wavelengths::default().frequencies(step);
+        let curve = coverage_curve(f, step, seed);
+        let knot = coverage * 64.0;
+        let (i, t) = (knot as usize, knot.fract());
+        let threshold = curve[i] + t * (curve[i + 1] - curve[i]);
+        let place = |h: u32| (f64::from(h) / f64::from(u32::MAX) * 2.0 - 1.0) * 1.5e6 / step;
+        let hits = (0..20_000u32).filter(|&i| {
+            let position = [place(pcg(2 * i)) as i32, place(pcg(2 * i + 1)) as i32];
+            coverage_field(position, f, seed) > threshold
+        });
+        hits.count() as f64 / 20_000.0
+    }
+
+    #[test]
+    fn coverage_is_the_share_of_the_area_that_is_covered() {
+        for (coverage, step, seed) in [(0.1, 1.4, 1), (0.3, 1.4, 2), (0.6, 1.9, 1), (0.905, 1.06, 7)] {
+            let share = covered(coverage, step, seed);
+            // 20 000 and 32 768 samples: standard deviation below 0.0045; and four of them.
+            assert!((share - f64::from(coverage)).abs() < 0.018, "{coverage}: {share}");
+        }
+    }
+
+    #[test]
+    fn a_clear_sky_is_clear_and_an_overcast_one_is_closed() {
+        assert!(covered(0.0, 1.4, 1) < 1e-3); // the greatest of 32 768 samples is exceeded about once in as many
+        assert!(covered(0.999_9, 1.4, 1) > 0.998);
+    }
+}

@@ -38,7 +38,7 @@ pub struct Grid {
     scan: Scan,
     params: Vec<Buffer>,
     coverage_map: Buffer,
-    cell_layers: Buffer,
+    cell_particles: Buffer,
     cell_shapes: Buffer,
     cell_first: Buffer,
     valid_cells: Buffer,
@@ -66,7 +66,7 @@ impl Grid {
             scan: Scan::new(gpu, cells)?,
             params,
             coverage_map: Buffer::upload(gpu, "coverage map", texels)?,
-            cell_layers: Buffer::array::<u32>(gpu, "cell layers", cells as usize)?,
+            cell_particles: Buffer::array::<u32>(gpu, "cell particles", cells as usize)?,
             cell_shapes: Buffer::array::<[f32; 4]>(gpu, "cell shapes", cells as usize)?,
             cell_first: Buffer::array::<u32>(gpu, "cell first", cells as usize)?,
             valid_cells: Buffer::array::<u32>(gpu, "valid cells", capacity as usize)?,
@@ -88,7 +88,7 @@ impl Grid {
         &self.params[slot]
     }
 
-    /// Height, body, weight and number of layers of every cell.
+    /// Height, body, weight and counts (layers + 64 · puffs) of every cell.
     #[must_use]
     pub fn cell_shapes(&self) -> &Buffer {
         &self.cell_shapes
@@ -124,14 +124,14 @@ impl Grid {
                 params: &self.params[slot],
                 coverage_map: &self.coverage_map,
                 counters: set.counters(),
-                cell_layers: &self.cell_layers,
+                cell_particles: &self.cell_particles,
                 cell_shapes: &self.cell_shapes,
                 valid_cells: &self.valid_cells,
             },
             &(),
             [self.cell_count, 1, 1],
         )?;
-        self.scan.record(rec, &self.cell_layers, self.cell_count, &self.cell_first, &self.scan_total)?;
+        self.scan.record(rec, &self.cell_particles, self.cell_count, &self.cell_first, &self.scan_total)?;
         rec.dispatch(
             &self.args,
             &args::Bindings {

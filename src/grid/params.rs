@@ -174,7 +174,7 @@ impl GridDesign {
     pub fn particle_bound(&self) -> u32 {
         let per_ring = self.fixed.ring_dim * self.fixed.ring_dim;
         let layers: i32 = (0..self.fixed.ring_count as usize).map(|ring| self.fixed.ring_first[ring][2]).sum();
-        per_ring.saturating_mul(layers as u32)
+        per_ring.saturating_mul(layers as u32 + 2 * self.fixed.ring_count) // two puffs a cell
     }
 
     /// Room for particles to begin with: columns are about half full, and outer rings have a hole. More is grown to.
@@ -202,9 +202,9 @@ impl GridDesign {
     /// No particle reaches farther from its centre than this [m].
     #[must_use]
     pub fn greatest_extent(&self) -> f32 {
-        // shape.glsl: 0.74 cells across, × 1.2 size, × 1.12; or as tall as a layer: 0.5 / 0.9 × 1.25 steps.
+        // shape.glsl: 0.74 cells across, × 1.55 size, × 1.12; or as tall as a layer: 0.5 / 0.9 × 1.25 steps.
         let last = self.fixed.ring_count as usize - 1;
-        let across = self.cell_edge as f32 * (1u32 << last) as f32 * (0.74 * 1.2 * 1.12);
+        let across = self.cell_edge as f32 * (1u32 << last) as f32 * (0.74 * 1.55 * 1.12);
         let tall = (0..=last).map(|ring| self.fixed.ring_layer[ring][0]).fold(0.0, f32::max) * (0.5 / 0.9 * 1.25);
         across.max(tall) * 1.01
     }
@@ -226,5 +226,132 @@ impl GridDesign {
         }
         params.camera = [0, 1, 2].map(|axis| (camera[axis] - origin[axis]) as f32);
         params
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::grid::{cell_place, generate, ring_weight};
+    use crate::shared::Particle;
+    use std::collections::HashMap;
+
+    fn design(quality: Quality) -> GridDesign {
+        GridDesign::new(&Clouds::default(), &quality, 6.36e6)
+    }
+
+    #[test]
+    fn the_medium_preset_has_the_authors_cells() {
+        let params = design(Quality::default()).frame([0.0; 3], [0.0; 3]);
+        assert!((params.ring_frame[0][2] - 183.8).abs() < 0.05);
+        assert_eq!(params.cell_count(), 4 * 136 * 136);
+        assert_eq!([0, 1, 2, 3].map(|ring| params.ring_first[ring][2]), [4, 2, 1, 1]);
+    }
+
+    #[test]
+    fn a_thicker_layer_of_cloud_takes_more_layers_of_particles() {
+        let clouds = Clouds { thickness: 2100.0, ..Clouds::default() };
+        let params = GridDesign::new(&clouds, &Quality::default(), f64::INFINITY).frame([0.0; 3], [0.0; 3]);
+        assert_eq!(params.ring_first[0][2], 12);
+        assert!((params.ring_layer[0][0] - 175.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn the_rings_weights_add_up_to_one_everywhere() {
+        let params = design(Quality::default()).frame([1234.5, 0.0, -987.6], [1024.0, 0.0, -1024.0]);
+        for i in 0..2000 {
+            // A spiral out to 85 km: the cut-off's own fade begins at 89.
+            let (r, angle) = (f64::from(i) * 42.5, f64::from(i) * 2.4);
+            let place =
+                [params.camera[0] + (r * f64::cos(angle)) as f32, params.camera[2] + (r * f64::sin(angle)) as f32];
+            let sum: f32 = (0..4).map(|ring| ring_weight(place, ring, &params)).sum();
+            assert!((sum - 1.0).abs() < 1e-6, "{place:?}: {sum}"); // f32 rounding
+        }
+    }
+
+    #[test]
+    fn every_cell_that_a_ring_still_shows_exists_wherever_the_camera_is_in_its_cell() {
+        for offset in [0.0, 0.3, 0.999] {
+            let design = design(Quality { cells: 24, rings: 3, ..Quality::default() });
+            let edge = design.cell_edge;
+            let params = design.frame([offset * edge, 0.0, -offset * edge], [0.0; 3]);
+            // One cell beyond the border of every ring but the last, nothing may be left to show.
+            for cell in 0..2 * 24 * 24 {
+                let place = cell_place(cell, &params);
+                let edge = params.ring_frame[place.ring as usize][2];
+                let outwards = place.local.map(|i| {
+                    if i == 0 {
+                        -edge
+                    } else if i == 23 {
+                        edge
+                    } else {
+                        0.0
+                    }
+                });
+                if outwards != [0.0; 2] {
+                    let beyond = [place.centre[0] + outwards[0], place.centre[1] + outwards[1]];
+                    assert!(ring_weight(beyond, place.ring, &params) < 1e-6, "{place:?}");
+                }
+            }
+        }
+    }
+
+    /// Particles by identity, absolute.
+    fn world(params: &GridParams, origin: [f64; 3]) -> HashMap<u32, (Particle, [f64; 3])> {
+        let particles = generate(params, &[]).particles;
+        let absolute = |p: &Particle| [0, 1, 2].map(|i| f64::from(p.centre[i]) + origin[i]);
+        particles.iter().map(|p| (p.id, (*p, absolute(p)))).collect()
+    }
+
+    #[test]
+    fn particles_stay_where_they_are_when_the_camera_and_the_origin_move() {
+        let clouds = Clouds { particle_cutoff: 2.0e4, ..Clouds::default() };
+        // Flat: on a globe the horizon, and with it the layer's drop, goes with the camera.
+        let design = GridDesign::new(&clouds, &Quality { cells: 40, ..Quality::default() }, f64::INFINITY);
+        let before = world(&design.frame([100_000.0, 0.0, 50.0], [99_328.0, 0.0, 0.0]), [99_328.0, 0.0, 0.0]);
+        let after =
+            world(&design.frame([100_777.0, 0.0, -900.0], [100_352.0, 0.0, -1024.0]), [100_352.0, 0.0, -1024.0]);
+        let mut same = 0;
+        for (id, (particle, place)) in &before {
+            let Some((other, other_place)) = after.get(id) else { continue };
+            same += 1;
+            // f32 positions of up to 2e4 m: steps of 2 mm, five operations.
+            assert!((0..3).all(|i| (place[i] - other_place[i]).abs() < 0.01), "{place:?} {other_place:?}");
+            assert_eq!(particle.rotation, other.rotation);
+            assert_eq!(particle.density, other.density);
+        }
+        assert!(same > before.len() / 2, "{same} of {}", before.len());
+    }
+
+    #[test]
+    fn clouds_stand_on_a_flat_base_and_narrow_upwards() {
+        let params = design(Quality::default()).frame([0.0; 3], [0.0; 3]);
+        let grid = generate(&params, &[]);
+        let above = |p: &Particle| {
+            let (x, z) = (p.centre[0] - params.camera[0], p.centre[2] - params.camera[2]);
+            p.centre[1] - (params.altitude - (x * x + z * z) * params.inverse_diameter)
+        };
+        let (mut low, mut high) = ((0, 0.0f32), (0, 0.0f32));
+        for (particle, packed) in grid.particles.iter().zip(&grid.cell_and_layer) {
+            let shape = grid.shapes[(packed >> 5) as usize];
+            let height = above(particle);
+            assert!((-20.0..params.thickness * 1.3).contains(&height), "{height} m above the base");
+            if packed & 31 == 0 {
+                // The centre of the lowest ball lies half a step above the base, give or take 3 % of its height.
+                let half_step = 0.5 * shape.height / shape.layers as f32;
+                assert!((height - half_step).abs() < 0.05 * 2.0 * half_step + 0.5, "{height} {half_step}");
+            }
+            let widest = particle.semi_axes.iter().fold(0.0f32, |a, &b| a.max(b));
+            if shape.body == 1.0 && shape.layers >= 3 && packed >> 5 < params.ring_dim * params.ring_dim {
+                let of = if packed & 31 == 0 { &mut low } else { &mut high };
+                if (packed & 31) + 1 == shape.layers || packed & 31 == 0 {
+                    *of = (of.0 + 1, of.1 + widest);
+                }
+            }
+        }
+        assert!(low.0 > 1000 && high.0 > 1000);
+        assert!(high.1 / high.0 as f32 <= 0.8 * low.1 / low.0 as f32);
+        let extent = design(Quality::default()).greatest_extent();
+        assert!(grid.particles.iter().all(|p| p.semi_axes.iter().all(|&axis| axis <= extent)));
     }
 }

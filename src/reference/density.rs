@@ -115,10 +115,10 @@ pub struct FieldFrequencies {
 #[must_use]
 pub fn coverage_field(position: [i32; 2], f: FieldFrequencies, seed: u32) -> f32 {
     let octave = |index: u32| seed.wrapping_add(index);
-    let heap = heaps(lattice_point(position, f.heap), seed);
-    let n1 = gradient_noise(lattice_point(position, f.billow), octave(1)) * 0.56;
-    let n2 = gradient_noise(lattice_point(position, f.billow * 2), octave(2)) * 0.34;
-    let n3 = gradient_noise(lattice_point(position, f.billow * 4), octave(3)) * 0.22;
+    let heap = heaps(lattice_point(position, f.heap), seed) * 1.35;
+    let n1 = gradient_noise(lattice_point(position, f.billow), octave(1)) * 0.5;
+    let n2 = gradient_noise(lattice_point(position, f.billow * 2), octave(2)) * 0.28;
+    let n3 = gradient_noise(lattice_point(position, f.billow * 4), octave(3)) * 0.15;
     let streak = gradient_noise(lattice_point(position, f.streak), octave(4)) + 0.75;
     let region = gradient_noise(lattice_point(position, f.region), octave(5)) + 1.0;
     let weather = (streak * region) * 0.55;

@@ -26,8 +26,10 @@ pub struct CellPlace {
 /// The column of cloud on a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CellShape {
-    /// Particles; 0: no cloud.
+    /// Layers of balls; 0: no cloud.
     pub layers: u32,
+    /// Small billows on top of them.
+    pub puffs: u32,
     /// Height [m].
     pub height: f32,
     /// 0 at a cloud's outline, 1 well inside.
@@ -125,7 +127,7 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     if excess <= 0.0 {
         return empty;
     }
-    let inside = (excess * 1.15).min(1.0);
+    let inside = (excess * 1.0).min(1.0);
     let left = 1.0 - inside;
     let shoulder = 1.0 - left * left;
     let tower = turret_field(position, f, p.seed) * 0.62 + 0.38;
@@ -133,7 +135,16 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     let height = fraction * p.thickness;
     let steps_up = height * p.ring_layer[place.ring as usize][1];
     let layers = (steps_up.ceil() as i32).clamp(1, p.ring_first[place.ring as usize][2]) as u32;
-    CellShape { layers, height, body: (excess * 3.0).min(1.0), weight }
+    let body = (excess * 3.0).min(1.0);
+    let near = p.ring_frame[place.ring as usize][2] < 400.0;
+    let puffs = if !near {
+        0
+    } else if body < 1.0 {
+        2
+    } else {
+        1
+    };
+    CellShape { layers, puffs, height, body, weight }
 }
 
 fn quaternion_multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
@@ -145,50 +156,94 @@ fn quaternion_multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     ]
 }
 
-/// Particle `layer` of a column, counted from its base.
-#[must_use]
-pub fn column_particle(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams) -> Particle {
-    let id = pcg(hash_lattice(place.absolute, p.seed.wrapping_add(16).wrapping_add(place.ring))
-        .wrapping_add(layer.wrapping_mul(0x9e37_79b9)));
-    let mut h = [pcg(id); 7];
-    for i in 1..7 {
+/// A column's ball before it is turned.
+struct Ball {
+    centre: [f32; 3],
+    across: f32,
+    tall: f32,
+    id: u32,
+    hash: u32,
+}
+
+fn hashes<const N: usize>(id: u32) -> [u32; N] {
+    let mut h = [pcg(id); N];
+    for i in 1..N {
         h[i] = pcg(h[i - 1]);
     }
+    h
+}
+
+fn ball_id(place: &CellPlace, index: u32, p: &GridParams) -> u32 {
+    let cell = hash_lattice(place.absolute, p.seed.wrapping_add(16).wrapping_add(place.ring));
+    pcg(cell.wrapping_add(index.wrapping_mul(0x9e37_79b9)))
+}
+
+fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams) -> Ball {
+    let id = ball_id(place, layer, p);
+    let h: [u32; 6] = hashes(id);
     let edge = p.ring_frame[place.ring as usize][2];
     let step = shape.height / shape.layers as f32;
     let up = (layer as f32 + 0.5) / shape.layers as f32;
 
-    let size = (1.0 - 0.42 * up * up) * (0.55 + 0.45 * shape.body) * (0.85 + 0.35 * unit_float(h[0]));
-    let across = edge * 0.74 * size;
+    let rare = (h[0] & 255) as f32 / 256.0;
+    let size = 0.8 + 0.3 * unit_float(h[0]) + 0.45 * (rare * rare) * (rare * rare);
+    let across = edge * 0.74 * (1.0 - 0.42 * up * up) * (0.55 + 0.45 * shape.body) * size;
     let tall = 0.5 * step / 0.9 * (0.95 + 0.3 * unit_float(h[1]));
-    let axes = [across * (0.88 + 0.24 * unit_float(h[2])), tall.max(0.35 * across), across];
 
     let jitter = if layer == 0 { 0.03 } else { 0.15 };
-    let x = place.centre[0] + signed_float(h[3]) * (0.4 * edge);
-    let z = place.centre[1] + signed_float(h[4]) * (0.4 * edge);
+    let x = place.centre[0] + signed_float(h[2]) * (0.4 * edge);
+    let z = place.centre[1] + signed_float(h[3]) * (0.4 * edge);
     let (dx, dz) = (x - p.camera[0], z - p.camera[2]);
     let base = p.altitude - (dx * dx + dz * dz) * p.inverse_diameter;
-    let y = base + (layer as f32 + 0.5) * step + signed_float(h[5]) * jitter * 2.0 * tall;
+    let y = base + (layer as f32 + 0.5) * step + signed_float(h[4]) * jitter * 2.0 * tall;
+    Ball { centre: [x, y, z], across, tall: tall.max(0.35 * across), id, hash: h[5] }
+}
 
-    let t = signed_float(h[6]);
+/// Layer that carries a puff with hash `id`.
+#[must_use]
+pub fn puff_host(id: u32, shape: &CellShape) -> u32 {
+    if shape.body < 1.0 { id % shape.layers } else { shape.layers - 1 }
+}
+
+fn puff_ball(place: &CellPlace, shape: &CellShape, index: u32, p: &GridParams) -> Ball {
+    let id = ball_id(place, index, p);
+    let h: [u32; 5] = hashes(id);
+    let host = column_ball(place, shape, puff_host(id, shape), p);
+    let side = [signed_float(h[0]), 0.15 + unit_float(h[1]), signed_float(h[2])];
+    let length = side.iter().map(|c| c * c).sum::<f32>().sqrt();
+    let across = host.across * (0.42 + 0.26 * unit_float(h[3]));
+    let sizes = [host.across, host.tall, host.across];
+    let centre = std::array::from_fn(|i| host.centre[i] + side[i] / length * sizes[i] * 0.82);
+    Ball { centre, across, tall: across * 0.9, id, hash: h[4] }
+}
+
+/// Particle `index` of a column: its layers from the base up, then its puffs.
+#[must_use]
+pub fn column_particle(place: &CellPlace, shape: &CellShape, index: u32, p: &GridParams) -> Particle {
+    let ball =
+        if index >= shape.layers { puff_ball(place, shape, index, p) } else { column_ball(place, shape, index, p) };
+    let (h1, h2) = (pcg(ball.hash), pcg(pcg(ball.hash)));
+    let axes = [ball.across * (0.88 + 0.24 * unit_float(h1)), ball.tall, ball.across];
+
+    let t = signed_float(h2);
     let yaw = [0.0, 2.0 * t, 0.0, 1.0 - t * t].map(|c| c / (1.0 + t * t));
-    let (tx, tz) = (0.16 * signed_float(pcg(h[6])), 0.16 * signed_float(pcg(h[6].wrapping_add(1))));
+    let (tx, tz) = (0.16 * signed_float(pcg(h2)), 0.16 * signed_float(pcg(h2.wrapping_add(1))));
     let length = (tx * tx + tz * tz + 1.0).sqrt();
     let upright = quaternion_multiply([tx / length, 0.0, tz / length, 1.0 / length], yaw);
     const HALF_ROOT: f32 = std::f32::consts::FRAC_1_SQRT_2;
-    let (rotation, semi_axes) = match h[5] % 3 {
+    let (rotation, semi_axes) = match ball.hash % 3 {
         0 => (upright, axes),
         1 => (quaternion_multiply(upright, [HALF_ROOT, 0.0, 0.0, HALF_ROOT]), [axes[0], axes[2], axes[1]]),
         _ => (quaternion_multiply(upright, [0.0, 0.0, HALF_ROOT, HALF_ROOT]), [axes[1], axes[0], axes[2]]),
     };
     Particle {
-        centre: [x, y, z],
+        centre: ball.centre,
         density: p.density * (0.35 + 0.65 * shape.body),
         rotation,
         semi_axes,
         fade: shape.weight,
         colour: [1.0; 3],
-        id,
+        id: ball.id,
     }
 }
 
@@ -199,9 +254,9 @@ pub struct Grid {
     pub shapes: Vec<CellShape>,
     /// First particle of every cell.
     pub first: Vec<u32>,
-    /// The particles, cell by cell, bottom up.
+    /// The particles, cell by cell: layers from the base up, then puffs.
     pub particles: Vec<Particle>,
-    /// `cell << 5 | layer` of every particle.
+    /// `cell << 5 | index within the column` of every particle.
     pub cell_and_layer: Vec<u32>,
 }
 
@@ -214,9 +269,9 @@ pub fn generate(p: &GridParams, map: &[f32]) -> Grid {
         let shape = cell_shape(&place, coverage_at(&place, map, p), p);
         grid.first.push(grid.particles.len() as u32);
         grid.shapes.push(shape);
-        for layer in 0..shape.layers {
-            grid.particles.push(column_particle(&place, &shape, layer, p));
-            grid.cell_and_layer.push(cell << 5 | layer);
+        for index in 0..shape.layers + shape.puffs {
+            grid.particles.push(column_particle(&place, &shape, index, p));
+            grid.cell_and_layer.push(cell << 5 | index);
         }
     }
     grid

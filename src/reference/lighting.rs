@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use crate::grid::GridParams;
-use crate::reference::grid::Grid;
+use crate::reference::grid::{Grid, puff_host};
 use crate::shared::Particle;
 
 fn vec(v: [f32; 3]) -> DVec3 {
@@ -48,24 +48,30 @@ fn sky_openness(above: f64) -> f64 {
 #[must_use]
 pub fn smooth(grid: &Grid, p: &GridParams, transmittance: &[f64], smoothing: f64, index: usize) -> (f64, f64) {
     let packed = grid.cell_and_layer[index];
-    let (cell, layer) = ((packed >> 5) as usize, packed & 31);
+    let (cell, within) = ((packed >> 5) as usize, packed & 31);
     let dim = p.ring_dim as i64;
-    let shape = grid.shapes[cell];
-    let height = (f64::from(layer) + 0.5) * f64::from(shape.height) / f64::from(shape.layers);
+    let (shape, particle) = (grid.shapes[cell], &grid.particles[index]);
+    let puff = within >= shape.layers;
+    let layer = if puff { puff_host(particle.id, &shape) } else { within };
+    let away = vec(particle.centre) - vec(p.camera);
+    let base = f64::from(p.altitude) - (away.x * away.x + away.z * away.z) * f64::from(p.inverse_diameter);
+    let height = f64::from(particle.centre[1]) - base;
     let local = [cell as i64 % dim, cell as i64 / dim % dim];
     let neighbour = |dx: i64, dz: i64| {
         let inside = (0..dim).contains(&(local[0] + dx)) && (0..dim).contains(&(local[1] + dz));
         inside.then(|| (cell as i64 + dz * dim + dx) as usize)
     };
     let mut slots = vec![(index, 1.0)];
-    if layer > 0 {
+    if puff {
+        slots.push(((grid.first[cell] + layer) as usize, smoothing));
+    } else if layer > 0 {
         slots.push((index - 1, smoothing));
     }
-    if layer + 1 < shape.layers {
+    if !puff && layer + 1 < shape.layers {
         slots.push((index + 1, smoothing));
     }
     for (dx, dz) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {
-        if let Some(other) = neighbour(dx, dz).filter(|&other| layer < grid.shapes[other].layers) {
+        if let Some(other) = neighbour(dx, dz).filter(|&other| !puff && layer < grid.shapes[other].layers) {
             slots.push((grid.first[other] as usize + layer as usize, smoothing));
         }
     }
