@@ -23,8 +23,8 @@
 
 // Shared with src/lut/axes.rs (asserted equal by tests/tables.rs).
 const float SCATTERING_LEVELS = 8.0;
-const float SCATTERING_R_MIN = 0.5;     // optical radius of level 0
-const float SCATTERING_R_MAX = 128.0;   // optical radius of the last level
+const float SCATTERING_R_MIN = 0.4;     // optical radius of level 0
+const float SCATTERING_R_MAX = 102.4;   // optical radius of the last level
 const float SCATTERING_MU_SCALE = 1.0;  // c: optical depth below which chords are spaced evenly (tuned)
 
 // (Theta, psi, mu) of a ray.

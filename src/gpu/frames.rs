@@ -56,6 +56,11 @@ impl Frames {
         self.commands.len()
     }
 
+    /// The device.
+    pub fn gpu(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+
     /// The state carried from frame to frame.
     pub fn state(&mut self) -> &mut RecorderState {
         &mut self.state

@@ -57,10 +57,10 @@ pub struct ScatteringShape {
 
 /// Number of levels of optical radius.
 pub const LEVELS: u32 = 8;
-/// Optical radius of the first level; below the thinnest ring-0 particle of the paper.
-pub const R_MIN: f64 = 0.5;
+/// Optical radius of the first level; the thinnest ring-0 particle of the paper (0.07 1/m · 92 m · 2^-4).
+pub const R_MIN: f64 = 0.4;
 /// Optical radius of the last level. Colours are constant beyond.
-pub const R_MAX: f64 = 128.0;
+pub const R_MAX: f64 = 102.4;
 /// Optical depth below which chords are spaced evenly, above it geometrically (tuned).
 pub const MU_SCALE: f64 = 1.0;
 

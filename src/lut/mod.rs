@@ -2,6 +2,8 @@
 
 pub mod axes;
 mod optical_depth;
+mod scattering;
 pub mod transport;
 
 pub use optical_depth::{OpticalDepthTable, style_index};
+pub use scattering::{LevelReport, ScatteringTable};
