@@ -8,6 +8,7 @@ pub mod compact;
 pub mod density;
 pub mod detail;
 pub mod error;
+pub mod film;
 pub mod gpu;
 pub mod grid;
 pub mod lighting;

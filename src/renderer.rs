@@ -7,10 +7,11 @@
 use crate::Result;
 use crate::atmosphere::SkyLight;
 use crate::blend::medium::MediumParams;
-use crate::blend::{BlendInputs, Blender, Choice, CloudTargets, Shading, choose};
+use crate::blend::{BlendInputs, Blender, Choice, CloudTargets, NO_CLOUD, Shading, choose, cloud_format};
 use crate::compact::{Compact, frustum_planes};
 use crate::detail::DetailTile;
-use crate::gpu::{Buffer, BufferKind, Gpu, Image, Recorder};
+use crate::film::Film;
+use crate::gpu::{Buffer, BufferKind, Gpu, Image, ImageDesc, Recorder};
 use crate::grid::{CounterReadback, Counters, Grid, GridDesign, ParticleList, ParticleSet};
 use crate::lighting::Lighting;
 use crate::params::{Camera, Params, Source, Style};
@@ -59,7 +60,10 @@ pub struct Renderer {
     frame: Vec<Buffer>,
     medium: Buffer,
     sky_light: Buffer,
-    opaque: Image,
+    film: Film,
+    low_opaque: Image,
+    opaque_distance: Image,
+    background: Image,
     counters: CounterReadback,
 }
 
@@ -104,6 +108,10 @@ impl Renderer {
         let frame = (0..slots)
             .map(|_| Buffer::new(gpu, "frame params", size_of::<FrameParams>() as u64, BufferKind::Upload))
             .collect::<Result<_>>()?;
+        let image = |name, [width, height]: [u32; 2], format| {
+            let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE;
+            Image::new(gpu, &ImageDesc { name, extent: [width, height, 0], format, usage })
+        };
         let sky_light = SkyLight { sun_irradiance_clouds: params.sun.irradiance, ..bytemuck::Zeroable::zeroed() };
         Ok(Self {
             compact: Compact::new(gpu, set.capacity())?,
@@ -116,15 +124,10 @@ impl Renderer {
             frame,
             medium: Buffer::upload(gpu, "medium", &[MediumParams::new(&params.clouds)])?,
             sky_light: Buffer::upload(gpu, "sky light", &[sky_light])?,
-            opaque: Image::new(
-                gpu,
-                &crate::gpu::ImageDesc {
-                    name: "opaque distance",
-                    extent: [low_extent[0], low_extent[1], 0],
-                    format: ash::vk::Format::R32_SFLOAT,
-                    usage: ash::vk::ImageUsageFlags::SAMPLED | ash::vk::ImageUsageFlags::STORAGE,
-                },
-            )?,
+            film: Film::new(gpu, extent, quality.precision)?,
+            low_opaque: image("low opaque distance", low_extent, vk::Format::R32_SFLOAT)?,
+            opaque_distance: image("opaque distance", extent, vk::Format::R32_SFLOAT)?,
+            background: image("background", extent, cloud_format(quality.precision))?,
             counters: CounterReadback::new(gpu, slots)?,
             params: params.clone(),
             extent,
@@ -145,6 +148,12 @@ impl Renderer {
     #[must_use]
     pub fn targets(&self) -> &CloudTargets {
         &self.targets
+    }
+
+    /// The finished frame: scene radiance and the toned picture.
+    #[must_use]
+    pub fn film(&self) -> &Film {
+        &self.film
     }
 
     /// Records one frame seen by `camera`.
@@ -206,7 +215,10 @@ impl Renderer {
         };
         // The sun's irradiance above the clouds is multiplied in by the shading: here it is a transmittance.
         rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid, [1.0; 3]))?;
-        rec.clear_image(&self.opaque, [crate::blend::NO_CLOUD; 4]);
+        for distance in [&self.low_opaque, &self.opaque_distance] {
+            rec.clear_image(distance, [NO_CLOUD; 4]);
+        }
+        rec.clear_image(&self.background, [0.0; 4]);
         let inputs = BlendInputs {
             frame: &self.frame[slot],
             particles: self.set.particles(),
@@ -217,11 +229,14 @@ impl Renderer {
             optical_depth_lut: tables.optical_depth,
             scattering_lut: tables.scattering,
             detail_tile: &self.detail.image,
-            opaque_distance: &self.opaque,
+            opaque_distance: &self.low_opaque,
             draw_args: self.compact.args(),
             draw_args_offset: Compact::DRAW_ARGS,
         };
         self.blender.record(rec, &inputs, &self.targets)?;
+        let film = &self.film;
+        film.record_composite(rec, &self.targets, &self.low_opaque, &self.opaque_distance, &self.background)?;
+        film.record_tonemap(rec, &self.params.film)?;
         self.counters.record(rec, &self.set);
         Ok(())
     }

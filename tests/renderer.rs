@@ -108,8 +108,7 @@ fn a_thousand_frames_of_a_moving_camera_leak_nothing() {
         let mut grown = 0;
         for _ in 0..1000 {
             camera.position[0] += 137.0;
-            let (slot, ()) =
-                device.frames().submit(|rec| renderer.record(rec, &camera, tables.images())).unwrap();
+            let (slot, ()) = device.frames().submit(|rec| renderer.record(rec, &camera, tables.images())).unwrap();
             if slot == 1 {
                 device.frames().wait().unwrap();
                 if renderer.finish(&gpu, slot).unwrap() {

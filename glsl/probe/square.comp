@@ -6,7 +6,7 @@ layout(constant_id = 0) const uint OFFSET = 0;
 struct Element { vec3 position; float value; };
 layout(binding = 0, std430) restrict readonly buffer Input { float numbers[]; } source;
 layout(binding = 1, std430) restrict writeonly buffer Output { Element elements[]; } squares;
-layout(push_constant) uniform Push { uint count; float scale; };
+layout(push_constant) uniform SquarePush { uint count; float scale; };
 
 void main() {
     uint index = gl_GlobalInvocationID.x;

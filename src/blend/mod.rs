@@ -38,7 +38,7 @@ impl CloudTargets {
 
 const NEAREST_FORMAT: vk::Format = vk::Format::R32_SFLOAT;
 
-fn cloud_format(precision: Precision) -> vk::Format {
+pub(crate) fn cloud_format(precision: Precision) -> vk::Format {
     match precision {
         Precision::F16 => vk::Format::R16G16B16A16_SFLOAT,
         Precision::F32 => vk::Format::R32G32B32A32_SFLOAT,

@@ -4,6 +4,7 @@ pub mod atmosphere;
 pub mod compact;
 pub mod density;
 pub mod detail;
+pub mod film;
 pub mod grid;
 pub mod lighting;
 pub mod monte_carlo;
