@@ -17,6 +17,7 @@ use crate::lighting::Lighting;
 use crate::params::{Camera, Params, Source, Style};
 use crate::shared::FrameParams;
 use crate::tiling::{Slab, Tiling, TilingParams};
+use ash::vk;
 use std::sync::Arc;
 
 /// Radius of the planet at sea level [m].
