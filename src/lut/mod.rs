@@ -1,9 +1,12 @@
 //! Particle tables, built once per medium and style: optical depth (Yusov 4.1) and scattering (4.2, 4.3).
 
 pub mod axes;
+mod cache;
 mod optical_depth;
 mod scattering;
+mod tables;
 pub mod transport;
 
 pub use optical_depth::{OpticalDepthTable, style_index};
 pub use scattering::{LevelReport, ScatteringTable};
+pub use tables::{Detail, Progress, TableParams, Tables, read_image};

@@ -11,6 +11,7 @@ use crate::reference::monte_carlo::{Medium, parallel};
 use crate::shaders::lut_scattering_comp as fill;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -31,15 +32,34 @@ struct FillPush {
     optical_radius: f32,
 }
 
-/// What was found out while building.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// What was found out while building a level.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LevelReport {
     /// Optical radius of the level.
     pub optical_radius: f64,
     /// How often the operator was applied, at most over all total angular momenta.
-    pub applications: usize,
-    /// Largest final residual.
+    pub applications: f64,
+    /// Largest final residual, relative.
     pub residual: f64,
+    /// Fraction of the light that meets the ball which leaves it after two or more events.
+    pub multiple: f64,
+}
+
+impl LevelReport {
+    pub(crate) const BYTES: usize = 32;
+
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        [self.optical_radius, self.applications, self.residual, self.multiple]
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect()
+    }
+
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
+        let [optical_radius, applications, residual, multiple] =
+            [0, 1, 2, 3].map(|i| f64::from_le_bytes(std::array::from_fn(|k| bytes[8 * i + k])));
+        Self { optical_radius, applications, residual, multiple }
+    }
 }
 
 /// The table of both kinds of scattering.
@@ -200,7 +220,8 @@ fn solve(
                 return Ok(None);
             }
         }
-        report.applications = orders.max(2) as usize - 1;
+        report.applications = f64::from(orders.max(2) - 1);
+        report.multiple = scattered_energy(plan, rotations, &sum[0]);
         return Ok(Some((sum, report)));
     }
 
@@ -240,9 +261,30 @@ fn solve(
     let mut sources = Vec::with_capacity(j_max + 1);
     for solver in low.into_iter().flatten().chain(solvers) {
         let (source, convergence) = solver.finish();
-        report.applications = report.applications.max(convergence.applications);
+        report.applications = report.applications.max(convergence.applications as f64);
         report.residual = report.residual.max(convergence.residual);
         sources.push(source);
     }
+    report.multiple = scattered_energy(plan, rotations, &sources[0]);
     Ok(Some((sources, report)))
+}
+
+/// Power that leaves along all rays, relative to the beam's: `4π ∫ 2π b L̄(b) db / π`, with L̄ the mean over sun directions,
+/// which is the part of total angular momentum 0. Between rays L̄ is linear in the zenith cosine.
+fn scattered_energy(plan: &Plan, rotations: &[Vec<Vec<f64>>], source: &[f64]) -> f64 {
+    let mut field = plan.emit(&plan.inner, 0, &rotations[0], source);
+    plan.sweep(&plan.inner, 0, &mut field);
+    let mut leaving: Vec<(f64, f64)> = (plan.inner.rays.iter())
+        .map(|&(start, count)| {
+            let last = start + count - 1;
+            (plan.inner.points[last].cos, field[last][0] / (4.0 * PI).sqrt())
+        })
+        .collect();
+    leaving.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // b db = mu dmu; the integral of a linear function times mu over each interval.
+    let pieces = leaving.windows(2).map(|w| {
+        let ((m0, l0), (m1, l1)) = (w[0], w[1]);
+        (m1 - m0) * (l0 * (2.0 * m0 + m1) + l1 * (m0 + 2.0 * m1)) / 6.0
+    });
+    8.0 * PI * pieces.sum::<f64>()
 }
