@@ -9,6 +9,7 @@ mod render;
 mod scenes;
 mod session;
 mod summary;
+mod tables;
 
 use std::io::Write;
 use std::process::ExitCode;

@@ -6,12 +6,13 @@ use std::time::Instant;
 use welkin::gpu::standalone::{Options, Standalone, validation_available};
 use welkin::gpu::{Buffer, BufferKind, Image, ImageDesc};
 use welkin::output::{BlendStats, CapacityStats, DeviceStats, ParticleStats, PassStats, Picture, TableStats};
-use welkin::params::{Lighting, Params, Precision, SkyModel};
+use welkin::params::{Lighting, Params, Precision, Style};
 use welkin::renderer::{ListUse, Renderer, TableImages};
 use welkin::{Error, Result};
 
 use super::args::{SceneArgs, Size};
 use super::progress::note;
+use super::tables::Tables;
 
 /// The device in use.
 pub struct Device(Standalone);
@@ -66,37 +67,41 @@ const MAX_TURNS: usize = 8;
 /// A renderer for one scene.
 pub struct Session {
     renderer: Renderer,
-    readback: Buffer,
+    tables: Option<Tables>,
+    /// Stands in for tables that nothing reads.
     unused: Image,
+    scene: Buffer,
+    picture: Buffer,
     size: Size,
+    precision: Precision,
 }
 
 impl Session {
     pub fn open(device: &mut Device, params: &Params, size: Size) -> Result<Self> {
-        let slots = device.0.frames().slots();
-        let gpu = device.0.gpu();
-        let renderer = Renderer::new(gpu, params, [size.width, size.height], slots)?;
-        let bytes = u64::from(size.width) * u64::from(size.height) * 16;
-        let not_yet = |needed: &str| Err(Error::Unsupported { needed: needed.into(), by: "this version yet".into() });
-        if params.clouds.lighting != Lighting::Flat {
-            return not_yet("clouds.lighting = \"tables\"");
-        }
-        if params.sky.model != SkyModel::None {
-            return not_yet("sky.model = \"atmosphere\"");
-        }
-        if params.quality.downscale != 1 || params.quality.precision != Precision::F16 {
-            return not_yet("quality other than downscale = 1, precision = \"f16\"");
-        }
-        let unused = Image::new(
-            gpu,
-            &ImageDesc {
-                name: "unused table",
-                extent: [2, 2, 2],
-                format: ash::vk::Format::R16G16_SFLOAT,
-                usage: ash::vk::ImageUsageFlags::SAMPLED,
-            },
-        )?;
-        Ok(Self { renderer, readback: Buffer::new(gpu, "picture", bytes, BufferKind::Readback)?, unused, size })
+        let frames = device.0.frames();
+        let gpu = frames.gpu().clone();
+        let renderer = Renderer::new(&gpu, params, [size.width, size.height], frames.slots())?;
+        let tables = match params.clouds.lighting {
+            Lighting::Flat if params.clouds.style == Style::Homogeneous => None,
+            _ => Some(Tables::make(frames, &params.clouds)?),
+        };
+        let unused = ImageDesc {
+            name: "unused table",
+            extent: [1, 1, 2],
+            format: ash::vk::Format::R16G16_SFLOAT,
+            usage: ash::vk::ImageUsageFlags::SAMPLED,
+        };
+        let pixels = u64::from(size.width) * u64::from(size.height);
+        let precision = params.quality.precision;
+        Ok(Self {
+            renderer,
+            tables,
+            unused: Image::new(&gpu, &unused)?,
+            scene: Buffer::new(&gpu, "scene readback", pixels * scene_texel_bytes(precision), BufferKind::Readback)?,
+            picture: Buffer::new(&gpu, "picture readback", pixels * 8, BufferKind::Readback)?,
+            size,
+            precision,
+        })
     }
 
     pub fn blend(&self) -> BlendStats {
@@ -109,7 +114,7 @@ impl Session {
     }
 
     pub fn tables(&self) -> Option<TableStats> {
-        None
+        self.tables.as_ref().map(|tables| tables.stats().clone())
     }
 
     /// Renders a frame and reads it back.
@@ -120,7 +125,7 @@ impl Session {
             (list.name.to_owned(), CapacityStats { needed: list.needed.into(), capacity: list.capacity.into() })
         });
         Ok(Frame {
-            picture: self.picture(),
+            picture: self.read_picture(),
             times,
             particles: ParticleStats {
                 cells: counters.cells.into(),
@@ -144,60 +149,70 @@ impl Session {
     /// Renders a frame, again where a list was too small; its slot and times.
     fn run(&mut self, device: &mut Device, params: &Params, read: bool) -> Result<(usize, Times)> {
         let started = Instant::now();
-        let gpu = device.0.gpu().clone();
         let frames = device.0.frames();
+        let gpu = frames.gpu().clone();
+        let unused = TableImages { optical_depth: &self.unused, scattering: &self.unused, fill: 1.0 };
+        let tables = self.tables.as_ref().map_or(unused, Tables::images);
+        let mut last = 0;
         for _ in 0..MAX_TURNS {
             let (slot, ()) = frames.submit(|rec| {
-                self.renderer.record(
-                    rec,
-                    &params.camera,
-                    TableImages { optical_depth: &self.unused, scattering: &self.unused, fill: 1.0 },
-                )?;
+                self.renderer.record(rec, &params.camera, tables)?;
                 if read {
-                    rec.copy_image_to_buffer(&self.renderer.targets().cloud, &self.readback);
-                    rec.make_visible_to_host(&self.readback);
+                    let film = self.renderer.film();
+                    for (image, buffer) in [(&film.scene, &self.scene), (&film.picture, &self.picture)] {
+                        rec.copy_image_to_buffer(image, buffer);
+                        rec.make_visible_to_host(buffer);
+                    }
                 }
                 Ok(())
             })?;
             frames.wait()?;
             if !self.renderer.finish(&gpu, slot)? {
-                let passes: Vec<_> = frames
-                    .state()
-                    .times(slot)
-                    .into_iter()
-                    .map(|pass| PassStats { name: pass.name.into(), gpu_ms: pass.gpu_ms })
-                    .collect();
+                let times = frames.state().times(slot).into_iter();
+                let passes: Vec<_> =
+                    times.map(|pass| PassStats { name: pass.name.into(), gpu_ms: pass.gpu_ms }).collect();
                 let gpu_ms = (!passes.is_empty()).then(|| passes.iter().map(|pass| pass.gpu_ms).sum());
                 let wall_ms = started.elapsed().as_secs_f64() * 1000.0;
                 return Ok((slot, Times { passes, gpu_ms, wall_ms }));
             }
             frames.state().forget();
+            last = slot;
         }
-        Err(too_small(&self.renderer.lists(0)))
+        Err(too_small(&self.renderer.lists(last)))
     }
 
-    /// The picture in the readback buffer.
-    fn picture(&self) -> Picture {
+    /// The picture in the readback buffers.
+    fn read_picture(&self) -> Picture {
         let pixels = self.size.width as usize * self.size.height as usize;
-        let half: Vec<half::f16> = self.readback.read(0, pixels * 4);
-        let radiance: Vec<[f32; 3]> =
-            half.chunks_exact(4).map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect();
+        let scene: Vec<[f32; 4]> = match self.precision {
+            Precision::F32 => self.scene.read(0, pixels),
+            Precision::F16 => {
+                let texels: Vec<[half::f16; 4]> = self.scene.read(0, pixels);
+                texels.into_iter().map(|texel| texel.map(half::f16::to_f32)).collect()
+            }
+        };
+        let display: Vec<[u16; 4]> = self.picture.read(0, pixels);
         Picture {
             width: self.size.width,
             height: self.size.height,
-            display: radiance.iter().map(|c| c.map(|v| v.clamp(0.0, 1.0))).collect(),
-            transmittance: Some(half.chunks_exact(4).map(|p| p[3].to_f32()).collect()),
-            radiance,
+            radiance: scene.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
+            transmittance: Some(scene.iter().map(|&[.., t]| t).collect()),
+            display: display.into_iter().map(|[r, g, b, _]| [r, g, b].map(|v| f32::from(v) / 65_535.0)).collect(),
         }
+    }
+}
+
+fn scene_texel_bytes(precision: Precision) -> u64 {
+    match precision {
+        Precision::F16 => 8,
+        Precision::F32 => 16,
     }
 }
 
 /// The error for lists that never grew enough.
 fn too_small(lists: &[ListUse]) -> Error {
-    let worst = lists.iter().max_by(|a, b| {
-        let fill = |list: &ListUse| f64::from(list.needed) / f64::from(list.capacity.max(1));
-        fill(a).total_cmp(&fill(b))
-    });
+    let fill = |list: &ListUse| f64::from(list.needed) / f64::from(list.capacity.max(1));
+    let worst = lists.iter().max_by(|a, b| fill(a).total_cmp(&fill(b)));
     let (list, needed, capacity) = worst.map_or(("particles", 0, 0), |l| (l.name, l.needed, l.capacity));
     Error::Capacity { list, needed: needed.into(), capacity: capacity.into() }
 }
