@@ -116,7 +116,7 @@ impl Renderer {
         let sky_light = SkyLight { sun_irradiance_clouds: params.sun.irradiance, ..bytemuck::Zeroable::zeroed() };
         Ok(Self {
             compact: Compact::new(gpu, set.capacity())?,
-            tiling: Tiling::new(gpu, levels, set.capacity().saturating_mul(NODES_PER_PARTICLE), slots)?,
+            tiling: Tiling::new(gpu, levels, set.capacity(), set.capacity().saturating_mul(NODES_PER_PARTICLE), slots)?,
             lighting: Lighting::new(gpu, set.capacity())?,
             detail: DetailTile::new(gpu)?,
             detail_filled: false,
@@ -253,7 +253,7 @@ impl Renderer {
         }
         grew |= self.compact.grow(gpu, &self.set)?;
         grew |= self.lighting.grow(gpu, &self.set)?;
-        grew |= self.tiling.grow(gpu, &counters)?;
+        grew |= self.tiling.grow(gpu, &counters, &self.set)?;
         Ok(grew)
     }
 

@@ -98,6 +98,7 @@ fn a_list_that_is_too_short_counts_on_and_is_cured_by_growing() {
     assert!(stages.set.grow(&gpu, &short).unwrap());
     assert!(stages.compact.grow(&gpu, &stages.set).unwrap());
     assert!(stages.lighting.grow(&gpu, &stages.set).unwrap());
+    stages.tiling.grow(&gpu, &short, &stages.set).unwrap();
     device.frames().state().forget();
     let cured = stages.run(&mut device, &setup);
     assert_eq!((cured.generated, cured.stored), (needed, needed));

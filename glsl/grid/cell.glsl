@@ -125,8 +125,10 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
     precise float steps_up = height * p.ring_layer[place.ring].y;
     shape.layers = uint(clamp(int(ceil(steps_up)), 1, p.ring_first[place.ring].z));
     shape.body = min(excess * 3.0, 1.0);
-    // Billows where a cell is near enough to show them: two at the outline, one inside.
-    if (p.ring_frame[place.ring].z < 400.0) shape.puffs = shape.body < 1.0 ? 2u : 1u;
+    // Billows where a cell is near enough to show them: two at the outline, one on every other column inside.
+    if (p.ring_frame[place.ring].z < 400.0) {
+        shape.puffs = shape.body < 1.0 ? 2u : hash_lattice(place.absolute, p.seed + 15u) & 1u;
+    }
     shape.height = height;
     return shape;
 }

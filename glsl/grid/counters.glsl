@@ -10,7 +10,7 @@ struct Counters {
     uint stored;      // particles that fit: min(generated, capacity)
     uint visible;     // particles in the view frustum
     uint tile_nodes;  // light list nodes wanted
-    uint longest_list; // nodes in the longest light list
+    uint longest_walk; // light list nodes that one receiver visited, at most
     uint truncated;   // receivers whose walk hit the traversal limit
 };
 

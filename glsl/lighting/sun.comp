@@ -18,8 +18,9 @@ layout(set = 0, binding = 5, std430) writeonly restrict buffer SunTransmittance 
 void main() {
     uint index = linear_index();
     if (index >= counters.count.stored) return;
-    bool truncated;
-    float optical_depth = sun_optical_depth_of(particles.particle[index].centre, index, truncated);
-    if (truncated) atomicAdd(counters.count.truncated, 1u);
+    uint visited;
+    float optical_depth = sun_optical_depth_of(particles.particle[index].centre, index, visited);
+    atomicMax(counters.count.longest_walk, visited);
+    if (visited > params.tiling.traversal_limit) atomicAdd(counters.count.truncated, 1u);
     sun.transmittance[index] = exp(-optical_depth);
 }

@@ -35,20 +35,17 @@ vec3 lift_to_slab(vec3 p_ws, in TilingParams t) {
     return p_ws;
 }
 
-// `self`: a particle that does not occlude (NO_NODE: none). `truncated` is set when the list was longer than the limit.
-float sun_optical_depth_of(vec3 p_ws, uint self, out bool truncated) {
-    truncated = false;
+// `self`: a particle that does not occlude (NO_NODE: none). `visited`: nodes looked at; beyond the limit, the rest of the
+// list was left out.
+float sun_optical_depth_of(vec3 p_ws, uint self, out uint visited) {
+    visited = 0u;
     vec3 start = lift_to_slab(p_ws, params.tiling);
     uint tile = receiver_tile(start, params.tiling);
     if (tile == NO_NODE) return 0.0;
     float depth = light_depth(start, params.tiling);
     float sum = 0.0;
     uint node = tile_heads.head[tile];
-    for (uint visited = 0u; node != NO_NODE; ++visited) {
-        if (visited >= params.tiling.traversal_limit) {
-            truncated = true;
-            break;
-        }
+    while (node != NO_NODE && ++visited <= params.tiling.traversal_limit) {
         TileNode entry = tile_nodes.node[node];
         // Front to back: from here on everything lies behind the receiver.
         if (key_depth(entry.key) < depth - params.tiling.greatest_extent) break;
@@ -63,8 +60,8 @@ float sun_optical_depth_of(vec3 p_ws, uint self, out bool truncated) {
 
 // For any point at all: on the ground, in the air, on a cloud.
 float sun_optical_depth(vec3 p_ws) {
-    bool truncated;
-    return sun_optical_depth_of(p_ws, NO_NODE, truncated);
+    uint visited;
+    return sun_optical_depth_of(p_ws, NO_NODE, visited);
 }
 
 #endif

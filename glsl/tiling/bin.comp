@@ -17,10 +17,9 @@ void main() {
     uint index = linear_index();
     if (index >= counters.count.stored) return;
     Particle p = particles.particle[index];
-    if (!(p.density * p.fade > 0.0)) return;
     uint key = light_key(light_depth(p.centre, params.tiling));
     for (uint level = 0u; level < params.tiling.level_count; ++level) {
-        if (!shades_level(p, level, params.tiling)) continue;
+        if (!in_level(p, level, params.tiling)) continue;
         TileRange tiles = particle_tiles(p, level, params.tiling);
         ivec2 size = max(tiles.greatest - tiles.least + 1, ivec2(0));
         uint needed = uint(size.x * size.y);

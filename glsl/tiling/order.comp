@@ -4,12 +4,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "tiling/params.glsl"
-#include "grid/counters.glsl"
 layout(local_size_x = 64) in;
 
-layout(set = 0, binding = 0, std430) restrict buffer CountersBuffer { Counters count; } counters;
-layout(set = 0, binding = 1, std430) restrict buffer TileHeads { uint head[]; } tile_heads;
-layout(set = 0, binding = 2, std430) restrict buffer TileNodes { TileNode node[]; } tile_nodes;
+layout(set = 0, binding = 0, std430) restrict buffer TileHeads { uint head[]; } tile_heads;
+layout(set = 0, binding = 1, std430) restrict buffer TileNodes { TileNode node[]; } tile_nodes;
 layout(push_constant) uniform OrderPush { uint tile_count; } push;
 
 bool before(uint a, uint b) {
@@ -23,7 +21,6 @@ void main() {
     uint head = tile_heads.head[tile];
     uint length = 0u;
     for (uint node = head; node != NO_NODE; node = tile_nodes.node[node].next) ++length;
-    if (length > 0u) atomicMax(counters.count.longest_list, length);
     for (uint run = 1u; run < length; run <<= 1u) {
         uint left = head, tail = NO_NODE;
         head = NO_NODE;

@@ -23,8 +23,8 @@ struct TilingParams {
     uint traversal_limit;  // nodes one receiver visits at most
     float occlusion;       // sigma_t · mean fill of a particle · xi: extinction that counts for occlusion [1/m]
     float greatest_extent; // no particle reaches farther from its centre [m]
-    uint unused_0;
-    uint unused_1;
+    uint levels_per_particle; // levels that one particle's shadow reaches at most
+    uint unused;
 };
 
 // One occluder in one tile's list.

@@ -37,6 +37,11 @@ bool shades_level(Particle p, uint level, in TilingParams t) {
     return greatest >= t.level_range[level].x && least <= t.level_range[level].y;
 }
 
+// Whether the particle is inserted in the level at all.
+bool in_level(Particle p, uint level, in TilingParams t) {
+    return p.density * p.fade > 0.0 && shades_level(p, level, t);
+}
+
 // Level that a receiver uses; level_count outside all.
 uint receiver_level(vec3 p_ws, in TilingParams t) {
     vec2 d = abs(p_ws.xz - t.centre.xz);

@@ -25,6 +25,7 @@ use crate::shaders::{grid_args_comp as args, grid_classify_comp as classify, gri
 
 pub use list::ParticleList;
 pub use params::{GridDesign, GridParams};
+pub(crate) use set::grown;
 pub use set::{CounterReadback, Counters, ParticleSet};
 
 /// Byte offset, in [`Grid::args`], of the dispatch over valid cells.
@@ -105,7 +106,7 @@ impl Grid {
         if counters.valid_cells <= self.valid_cell_capacity {
             return Ok(false);
         }
-        self.valid_cell_capacity = set::grown(counters.valid_cells).min(self.cell_count);
+        self.valid_cell_capacity = grown(counters.valid_cells).min(self.cell_count);
         self.valid_cells = Buffer::array::<u32>(gpu, "valid cells", self.valid_cell_capacity as usize)?;
         Ok(true)
     }

@@ -24,15 +24,15 @@ pub struct Counters {
     pub visible: u32,
     /// Light list nodes wanted.
     pub tile_nodes: u32,
-    /// Nodes in the longest light list.
-    pub longest_list: u32,
+    /// Light list nodes that one receiver visited, at most.
+    pub longest_walk: u32,
     /// Receivers whose walk through a light list hit the traversal limit.
     pub truncated: u32,
 }
 
 assert_layout!(Counters, counters, {
     cells: CELLS, valid_cells: VALID_CELLS, generated: GENERATED, stored: STORED, visible: VISIBLE,
-    tile_nodes: TILE_NODES, longest_list: LONGEST_LIST, truncated: TRUNCATED,
+    tile_nodes: TILE_NODES, longest_walk: LONGEST_WALK, truncated: TRUNCATED,
 });
 
 impl Counters {

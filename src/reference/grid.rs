@@ -137,12 +137,11 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     let layers = (steps_up.ceil() as i32).clamp(1, p.ring_first[place.ring as usize][2]) as u32;
     let body = (excess * 3.0).min(1.0);
     let near = p.ring_frame[place.ring as usize][2] < 400.0;
-    let puffs = if !near {
-        0
-    } else if body < 1.0 {
-        2
-    } else {
-        1
+    let chance = hash_lattice(place.absolute, p.seed.wrapping_add(15)) & 1;
+    let puffs = match (near, body < 1.0) {
+        (false, _) => 0,
+        (true, true) => 2,
+        (true, false) => chance,
     };
     CellShape { layers, puffs, height, body, weight }
 }

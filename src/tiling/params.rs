@@ -49,10 +49,10 @@ pub struct TilingParams {
     pub occlusion: f32,
     /// No particle reaches farther from its centre [m].
     pub greatest_extent: f32,
+    /// Levels that one particle's shadow reaches at most.
+    pub levels_per_particle: u32,
     /// Not used.
-    pub unused_0: u32,
-    /// Not used.
-    pub unused_1: u32,
+    pub unused: u32,
 }
 
 assert_layout!(TilingParams, tiling_params, {
@@ -60,6 +60,7 @@ assert_layout!(TilingParams, tiling_params, {
     inverse_diameter: INVERSE_DIAMETER, centre: CENTRE, reach: REACH, level_rect: LEVEL_RECT,
     level_range: LEVEL_RANGE, level_count: LEVEL_COUNT, tile_dim: TILE_DIM, node_capacity: NODE_CAPACITY,
     traversal_limit: TRAVERSAL_LIMIT, occlusion: OCCLUSION, greatest_extent: GREATEST_EXTENT,
+    levels_per_particle: LEVELS_PER_PARTICLE,
 });
 
 /// One occluder in one tile's list (`glsl/tiling/params.glsl`).
@@ -138,6 +139,11 @@ impl TilingParams {
             params.level_range[level] = [inner as f32, half as f32, 0.0, 0.0];
             inner = half;
         }
+        // A particle's shadow spans a range of Chebyshev distances no longer than this. It crosses most borders between
+        // levels where they are densest: from just inside the first one outwards.
+        let span = f64::from(params.reach) + 2.0 * f64::from(slab.greatest_extent) + 4.0;
+        let borders = slab.half_widths.iter().rev().skip(1).filter(|&&border| border < slab.half_widths[0] + span);
+        params.levels_per_particle = 1 + borders.count() as u32;
         params.level_count = slab.half_widths.len() as u32;
         params.tile_dim = TILE_DIM;
         params.traversal_limit = TRAVERSAL_LIMIT;
