@@ -22,6 +22,8 @@ pub enum Command {
     Devices(DevicesArgs),
     /// Render scenes to pictures
     Render(RenderArgs),
+    /// Compute the full tables of a scene's cloud medium: into the cache, and as .npy files with a JSON file naming each axis
+    Precompute(PrecomputeArgs),
     /// Measure the GPU time of each pass: median and 95th percentile
     Bench(BenchArgs),
 }
@@ -45,8 +47,22 @@ pub struct PictureArgs {
     /// How overlapping particles are composited: auto, interlock[:K], alpha
     #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
     pub blend: Option<Blend>,
+    /// Which tables to light particles from
+    #[arg(long, value_enum, default_value_t)]
+    pub tables: TablesArg,
     #[command(flatten)]
     pub scene: SceneArgs,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TablesArg {
+    /// Full ones; reduced ones for the low preset while there are no full ones in the cache
+    #[default]
+    Auto,
+    /// Full ones, which take longer to make the first time
+    Full,
+    /// Reduced ones, made in a few seconds
+    Reduced,
 }
 
 /// Where a scene's values, device and tables come from.
@@ -58,6 +74,9 @@ pub struct SceneArgs {
     /// Device by part of its name or by its index in `welkin devices`
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
+    /// Where tables are kept between runs [default: $WELKIN_CACHE, or welkin in the user's cache directory]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -86,6 +105,18 @@ pub struct RenderArgs {
     /// Write PNG with 16 bits a channel
     #[arg(long)]
     pub png16: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct PrecomputeArgs {
+    /// Scene file whose medium is meant [default: the default medium]
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: Option<PathBuf>,
+    /// Directory for the tables; made if need be
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub args: SceneArgs,
 }
 
 #[derive(Args, Debug)]
@@ -204,7 +235,7 @@ mod tests {
     fn a_full_line_is_understood() {
         let args = render(
             "sky.toml -o out.png --size 64x32 --quality low --blend interlock:4 --device llvm --frames 3..7 \
-             --stats s.json --set a.b=1 --set c=2 --aux --png16",
+             --stats s.json --set a.b=1 --set c=2 --aux --png16 --cache /c --tables full",
         )
         .unwrap();
         assert_eq!(args.picture.size, Size { width: 64, height: 32 });

@@ -82,7 +82,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let mut contenders = modes
         .into_iter()
         .map(|params| {
-            let session = Session::open(&mut device, &params, args.picture.size)?;
+            let session = Session::open(&mut device, &params, &args.picture)?;
             Ok(Contender { session, params, totals: Vec::new(), passes: PassTimes::default() })
         })
         .collect::<Result<Vec<_>>>()?;

@@ -4,6 +4,7 @@ mod args;
 mod bench;
 mod devices;
 mod places;
+mod precompute;
 mod progress;
 mod render;
 mod scenes;
@@ -25,6 +26,7 @@ pub fn main() -> ExitCode {
     let outcome = match &cli.command {
         Command::Devices(args) => devices::run(args),
         Command::Render(args) => render::run(args),
+        Command::Precompute(args) => precompute::run(args),
         Command::Bench(args) => bench::run(args),
     };
     match outcome {

@@ -1,4 +1,4 @@
-//! Where pictures go.
+//! Where files go: pictures, and the cache of tables.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -52,6 +52,22 @@ pub fn in_directory(file: &Path) -> Result<()> {
     }
 }
 
+/// The directory for tables: what was asked for, `$WELKIN_CACHE`, or `welkin` in the user's cache directory.
+pub fn cache(asked: Option<&Path>) -> PathBuf {
+    cache_from(asked, |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from))
+}
+
+fn cache_from(asked: Option<&Path>, variable: impl Fn(&str) -> Option<PathBuf>) -> PathBuf {
+    asked
+        .map(Path::to_owned)
+        .or_else(|| variable("WELKIN_CACHE"))
+        // The XDG specification has relative paths ignored.
+        .or_else(|| variable("XDG_CACHE_HOME").filter(|path| path.is_absolute()).map(|base| base.join("welkin")))
+        .or_else(|| variable("LOCALAPPDATA").map(|base| base.join("welkin")))
+        .or_else(|| variable("HOME").map(|home| home.join(".cache/welkin")))
+        .unwrap_or_else(|| std::env::temp_dir().join("welkin-cache"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,5 +98,22 @@ mod tests {
         assert!(message(&["sky.toml"], "no/such/a.png").contains("there is no directory no/such"));
         assert!(message(&["a.toml", "b.toml"], "a.png").starts_with("--output = a.png: expected a directory"));
         assert!(message(&["x/a.toml", "y/a.toml"], "./").contains("would be written for x/a.toml and for y/a.toml"));
+    }
+
+    #[test]
+    fn the_cache_is_where_it_is_asked_for() {
+        let none = |_: &str| None;
+        assert_eq!(cache_from(Some(Path::new("c")), none), Path::new("c"));
+        let environment = |name: &str| match name {
+            "XDG_CACHE_HOME" => Some(PathBuf::from("/xdg")),
+            "HOME" => Some(PathBuf::from("/home/me")),
+            _ => None,
+        };
+        assert_eq!(cache_from(None, environment), Path::new("/xdg/welkin"));
+        assert_eq!(
+            cache_from(None, |name| environment(name).filter(|_| name == "HOME")),
+            Path::new("/home/me/.cache/welkin")
+        );
+        assert_eq!(cache_from(None, |name| (name == "WELKIN_CACHE").then(|| "/w".into())), Path::new("/w"));
     }
 }

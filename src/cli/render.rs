@@ -46,7 +46,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 /// Renders every frame of a scene.
 fn render(args: &RenderArgs, job: &Job<'_>, device: &mut Device) -> Result<Stats> {
     let size = args.picture.size;
-    let mut session = Session::open(device, &job.params, size)?;
+    let mut session = Session::open(device, &job.params, &args.picture)?;
     let depth = if args.png16 { PngDepth::Sixteen } else { PngDepth::Eight };
     let frames = args.frames.as_ref().map_or(0..1, |range| range.0.clone());
     let mut progress =

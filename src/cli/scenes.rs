@@ -22,6 +22,15 @@ pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
     Ok(params)
 }
 
+/// The parameters of an optional scene file where no picture is meant.
+pub fn load_medium(path: Option<&Path>, args: &SceneArgs) -> Result<Params> {
+    let overrides: Vec<_> = sets(args).collect();
+    match path {
+        Some(path) => scene::load(path, &overrides),
+        None => scene::parse("", Path::new("the default scene"), &overrides),
+    }
+}
+
 fn sets(args: &SceneArgs) -> impl Iterator<Item = Override> + '_ {
     args.set.iter().map(|assignment| Override { flag: "--set".into(), assignment: assignment.clone() })
 }

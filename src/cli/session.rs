@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use welkin::gpu::standalone::{Options, Standalone, validation_available};
-use welkin::gpu::{Buffer, BufferKind, Image, ImageDesc};
+use welkin::gpu::{Buffer, BufferKind, Frames, Image, ImageDesc};
+use welkin::lut::Tables;
 use welkin::output::{BlendStats, CapacityStats, DeviceStats, ParticleStats, PassStats, Picture, TableStats};
 use welkin::params::{Lighting, Params, Precision, Style};
 use welkin::renderer::{ListUse, Renderer, TableImages};
 use welkin::{Error, Result};
 
-use super::args::{SceneArgs, Size};
+use super::args::{PictureArgs, SceneArgs, Size};
 use super::progress::note;
-use super::tables::Tables;
+use super::{places, tables};
 
 /// The device in use.
 pub struct Device(Standalone);
@@ -25,6 +26,10 @@ impl Device {
             note("the validation layer is not installed: validation_messages will be null");
         }
         Standalone::new(Options { device: args.device.clone(), validation, ..Options::default() }).map(Self)
+    }
+
+    pub fn frames(&mut self) -> &mut Frames {
+        self.0.frames()
     }
 
     pub fn stats(&self) -> DeviceStats {
@@ -67,7 +72,7 @@ const MAX_TURNS: usize = 8;
 /// A renderer for one scene.
 pub struct Session {
     renderer: Renderer,
-    tables: Option<Tables>,
+    tables: Option<(Tables, TableStats)>,
     /// Stands in for tables that nothing reads.
     unused: Image,
     scene: Buffer,
@@ -77,13 +82,17 @@ pub struct Session {
 }
 
 impl Session {
-    pub fn open(device: &mut Device, params: &Params, size: Size) -> Result<Self> {
+    pub fn open(device: &mut Device, params: &Params, args: &PictureArgs) -> Result<Self> {
+        let size = args.size;
         let frames = device.0.frames();
         let gpu = frames.gpu().clone();
         let renderer = Renderer::new(&gpu, params, [size.width, size.height], frames.slots())?;
         let tables = match params.clouds.lighting {
             Lighting::Flat if params.clouds.style == Style::Homogeneous => None,
-            _ => Some(Tables::make(frames, &params.clouds)?),
+            _ => {
+                let cache = places::cache(args.scene.cache.as_deref());
+                Some(tables::obtain(frames, params, args.tables, &cache)?)
+            }
         };
         let unused = ImageDesc {
             name: "unused table",
@@ -114,7 +123,7 @@ impl Session {
     }
 
     pub fn tables(&self) -> Option<TableStats> {
-        self.tables.as_ref().map(|tables| tables.stats().clone())
+        self.tables.as_ref().map(|(_, stats)| stats.clone())
     }
 
     /// Renders a frame and reads it back.
@@ -152,7 +161,11 @@ impl Session {
         let frames = device.0.frames();
         let gpu = frames.gpu().clone();
         let unused = TableImages { optical_depth: &self.unused, scattering: &self.unused, fill: 1.0 };
-        let tables = self.tables.as_ref().map_or(unused, Tables::images);
+        let tables = self.tables.as_ref().map_or(unused, |(tables, _)| TableImages {
+            optical_depth: tables.optical_depth.image(),
+            scattering: tables.scattering.image(),
+            fill: tables.fill(),
+        });
         let mut last = 0;
         for _ in 0..MAX_TURNS {
             let (slot, ()) = frames.submit(|rec| {
