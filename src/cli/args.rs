@@ -115,6 +115,9 @@ pub struct PrecomputeArgs {
     /// Directory for the tables; made if need be
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Make reduced tables, as a first picture uses
+    #[arg(long)]
+    pub reduced: bool,
     #[command(flatten)]
     pub args: SceneArgs,
 }

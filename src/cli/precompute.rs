@@ -37,7 +37,8 @@ pub fn run(args: &PrecomputeArgs) -> Result<()> {
     let params = scenes::load_medium(args.scene.as_deref(), &args.args)?;
     let mut device = Device::open(&args.args, false)?;
     let frames = device.frames();
-    let wanted = TableParams::new(&params.clouds, Detail::Full);
+    let detail = if args.reduced { Detail::Coarse } else { Detail::Full };
+    let wanted = TableParams::new(&params.clouds, detail);
     let made = tables::make(frames, &wanted, &places::cache(args.args.cache.as_deref()))?;
     let files = [
         optical_depth(made.optical_depth.shape(), &made.read_optical_depth(frames)?),

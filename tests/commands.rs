@@ -1,0 +1,172 @@
+//! What the commands make: pictures, sequences, statistics, measurements, tables.
+mod support;
+
+use std::path::Path;
+use std::process::Output;
+use support::{stderr, stdout, welkin};
+
+/// A scene that needs no tables: one ellipsoid of its own colour before black.
+const FLAT: &str = r#"
+    [camera]
+    position = [0, 0, 0]
+    pitch = 0
+    [clouds]
+    source = "particles"
+    lighting = "flat"
+    style = "homogeneous"
+    [[clouds.particle]]
+    centre = [0, 0, -500]
+    radii = [100, 50, 100]
+    colour = [1, 0.5, 0.25]
+    [quality]
+    downscale = 1
+    [sky]
+    model = "none"
+    [animation]
+    velocity = [0, 0, -20]
+"#;
+
+/// A directory of its own for a test, with `sky.toml` in it.
+fn directory(scene: &str) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("sky.toml"), scene).unwrap();
+    directory
+}
+
+/// Runs `welkin` with the words of `line` in `directory`, where it also keeps its tables; it must succeed.
+fn run(directory: &Path, line: &str) -> Output {
+    let mut command = welkin();
+    command.args(line.split_whitespace()).current_dir(directory).env("WELKIN_CACHE", directory.join("cache"));
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{line}: {}", stderr(&output));
+    output
+}
+
+/// Names in `directory` other than the scene's.
+fn files(directory: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(directory).unwrap();
+    let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.retain(|name| name != "sky.toml");
+    names.sort();
+    names
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn devices_says_why_a_mode_cannot_be_used() {
+    let directory = directory("");
+    let report: serde_json::Value = serde_json::from_str(&stdout(&run(directory.path(), "devices --json"))).unwrap();
+    let devices = report["devices"].as_array().unwrap();
+    assert!(!devices.is_empty());
+    for mode in devices.iter().flat_map(|device| device["blend"].as_array().unwrap()) {
+        assert_ne!(mode["supported"].as_bool().unwrap(), mode["reason"].is_string(), "{mode}");
+    }
+    assert!(stdout(&run(directory.path(), "devices")).contains("interlock"));
+}
+
+#[test]
+fn a_picture_its_transmittance_and_its_statistics() {
+    let directory = directory(FLAT);
+    let path = |name| directory.path().join(name);
+    run(directory.path(), "render sky.toml -o a.exr --size 40x30 --aux --stats s.json");
+    assert_eq!(files(directory.path()), ["a.exr", "a.transmittance.npy", "s.json"]);
+
+    let picture = image::open(path("a.exr")).unwrap().to_rgb32f();
+    assert_eq!(picture.dimensions(), (40, 30));
+    // Through the middle of the ellipsoid τ = 0.07 · 200: Eq. 8 with T = 8e-7 leaves its own colour alone.
+    let middle = picture.get_pixel(20, 15).0;
+    let bound = 1e-3; // half-float targets hold three digits
+    assert!(middle.iter().zip([1.0, 0.5, 0.25]).all(|(v, c)| (v - c).abs() < bound), "{middle:?}");
+    assert_eq!(picture.get_pixel(0, 0).0, [0.0; 3]);
+
+    let bytes = std::fs::read(path("a.transmittance.npy")).unwrap();
+    let transmittance = npyz::NpyFile::new(&bytes[..]).unwrap();
+    assert_eq!(transmittance.shape(), [30, 40]);
+    let transmittance = transmittance.into_vec::<f32>().unwrap();
+    assert_eq!(transmittance[0], 1.0);
+    assert!(transmittance[15 * 40 + 20] < 1e-3);
+
+    let stats = json(&path("s.json"));
+    assert_eq!((&stats["particles"]["generated"], &stats["particles"]["visible"]), (&1.into(), &1.into()));
+    assert_eq!(stats["blend"]["requested"], "auto");
+    assert!(stats["blend"]["used"] == "interlock" || stats["blend"]["reason"].as_str().unwrap().contains("interlock"));
+    assert_eq!(stats["validation_messages"], 0);
+    assert!(stats["tables"].is_null(), "nothing here reads tables");
+    let passes = stats["passes"].as_array().unwrap();
+    let sum: f64 = passes.iter().map(|pass| pass["gpu_ms"].as_f64().unwrap()).sum();
+    assert!(!passes.is_empty() && (stats["frame_gpu_ms"].as_f64().unwrap() - sum).abs() < 1e-9);
+}
+
+#[test]
+fn a_sequence_is_numbered_and_moves() {
+    let directory = directory(FLAT);
+    run(directory.path(), "render sky.toml -o a.npy --size 160x80 --frames 3..5");
+    assert_eq!(files(directory.path()), ["a.0003.npy", "a.0004.npy"]);
+    let read = |name| std::fs::read(directory.path().join(name)).unwrap();
+    assert!(read("a.0003.npy") != read("a.0004.npy"), "the camera moved 20 m, the picture did not change");
+    // A frame of a sequence is the picture of the scene with the camera there.
+    run(directory.path(), "render sky.toml -o b.npy --size 160x80 --set camera.position=[0,0,-60]");
+    assert!(read("a.0003.npy") == read("b.npy"));
+}
+
+#[test]
+fn several_scenes_go_into_a_directory_with_one_list_of_statistics() {
+    let directory = directory(FLAT);
+    std::fs::write(directory.path().join("b.toml"), FLAT).unwrap();
+    let output = run(directory.path(), "render sky.toml b.toml -o out/ --size 16x8 --png16 --stats");
+    assert_eq!(files(&directory.path().join("out")), ["b.png", "sky.png"]);
+    let stats: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(stats.as_array().unwrap().len(), 2);
+    let picture = image::open(directory.path().join("out/sky.png")).unwrap();
+    assert_eq!((picture.color(), picture.width(), picture.height()), (image::ColorType::Rgb16, 16, 8));
+}
+
+#[test]
+fn bench_compares_two_modes_in_one_run() {
+    let directory = directory(FLAT);
+    let line = "bench sky.toml --size 32x16 --blend alpha --vs alpha --measure 2 --warmup 1 --json";
+    let report: serde_json::Value = serde_json::from_str(&stdout(&run(directory.path(), line))).unwrap();
+    assert_eq!((&report["a"]["blend"]["used"], &report["b"]["blend"]["used"]), (&"alpha".into(), &"alpha".into()));
+    assert!(report["ratio"]["frame"].as_f64().unwrap() > 0.0);
+    let passes = report["a"]["passes"].as_array().unwrap();
+    assert!(passes.iter().any(|pass| pass["name"] == "blend" && pass["p95_ms"].as_f64() >= pass["median_ms"].as_f64()));
+}
+
+#[test]
+fn tables_are_made_once_read_from_the_cache_and_made_anew_when_damaged() {
+    let directory = directory("");
+    let cache = directory.path().join("cache");
+    let made = |output: &Output| stderr(output).contains("made the tables");
+    let line = "precompute --reduced --out out";
+    assert!(made(&run(directory.path(), line)));
+
+    let out = directory.path().join("out");
+    assert_eq!(files(&out), ["optical_depth.npy", "scattering.npy", "tables.json"]);
+    let index = json(&out.join("tables.json"));
+    for table in index["tables"].as_array().unwrap() {
+        let bytes = std::fs::read(out.join(table["file"].as_str().unwrap())).unwrap();
+        let file = npyz::NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(serde_json::json!(file.shape()), table["shape"]);
+        let values = file.into_vec::<f32>().unwrap();
+        assert!(
+            values.iter().all(|&v| (0.0..=10.0).contains(&v)),
+            "mean densities and source functions are of order 1"
+        );
+    }
+    let first = std::fs::read(out.join("scattering.npy")).unwrap();
+
+    assert!(!made(&run(directory.path(), line)), "the cache was not used");
+    for file in files(&cache) {
+        let path = cache.join(file);
+        let mut bytes = std::fs::read(&path).unwrap();
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        std::fs::write(&path, bytes).unwrap();
+    }
+    let again = run(directory.path(), line);
+    assert!(made(&again) && stderr(&again).contains("warning"), "{}", stderr(&again));
+    assert!(std::fs::read(out.join("scattering.npy")).unwrap() == first, "rebuilt tables differ");
+}
