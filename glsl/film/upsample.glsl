@@ -15,31 +15,35 @@ float agreement(float a, float b) {
     return max(exp(-30.0 * ratio), 1e-4);
 }
 
+// Where all sixteen texels agree with the pixel the filter is Catmull-Rom, limited to the range of the inner four so that
+// it neither rings nor haloes; where some do not, it fades to a bilinear filter of those that do, whose weights are all
+// positive. Exact where the weights are: a texel centre.
 vec4 upsample(sampler2D cloud, sampler2D low_opaque, sampler2D opaque_distance, ivec2 pixel, ivec2 size) {
     ivec2 low_size = textureSize(cloud, 0);
     // Both images cover the whole view: equal relative coordinates see the same ray.
     vec2 at = (vec2(pixel) + 0.5) / vec2(size) * vec2(low_size) - 0.5;
-    vec2 base = floor(at);
-    vec4 wx = catmull_rom(at.x - base.x), wy = catmull_rom(at.y - base.y);
+    vec2 base = floor(at), f = at - base;
+    vec4 wx = catmull_rom(f.x), wy = catmull_rom(f.y);
     float distance = texelFetch(opaque_distance, pixel, 0).x;
-    vec4 sum = vec4(0.0), least = vec4(3e38), greatest = vec4(-3e38);
-    float weights = 0.0;
+    vec4 sharp = vec4(0.0), soft = vec4(0.0), least = vec4(3e38), greatest = vec4(-3e38);
+    float soft_weight = 0.0, worst = 1.0;
     for (int y = 0; y < 4; ++y) {
         for (int x = 0; x < 4; ++x) {
             ivec2 texel = clamp(ivec2(base) + ivec2(x, y) - 1, ivec2(0), low_size - 1);
             vec4 value = texelFetch(cloud, texel, 0);
             float agree = agreement(texelFetch(low_opaque, texel, 0).x, distance);
-            float weight = wx[x] * wy[y] * agree;
-            sum += weight * value;
-            weights += weight;
-            if (x > 0 && x < 3 && y > 0 && y < 3 && agree > 0.1) {
+            worst = min(worst, agree);
+            sharp += wx[x] * wy[y] * value;
+            if (x > 0 && x < 3 && y > 0 && y < 3) {
+                float weight = (x == 1 ? 1.0 - f.x : f.x) * (y == 1 ? 1.0 - f.y : f.y) * agree;
+                soft += weight * value;
+                soft_weight += weight;
                 least = min(least, value);
                 greatest = max(greatest, value);
             }
         }
     }
-    vec4 result = sum / max(weights, 1e-6);
-    return least.x > greatest.x ? result : clamp(result, least, greatest);
+    return mix(soft / soft_weight, clamp(sharp, least, greatest), smoothstep(0.5, 0.9, worst));
 }
 
 #endif
