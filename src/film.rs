@@ -1,9 +1,9 @@
 //! From the cloud targets and the background to the picture: upsampling, compositing, exposure, tone curve.
 
 use crate::Result;
-use crate::blend::{CloudTargets, cloud_format};
+use crate::blend::cloud_format;
 use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
-use crate::params::{self, Precision, ToneCurve};
+use crate::params::{self, Precision, SkyModel, ToneCurve};
 use crate::shaders::{film_composite_comp as composite, film_tonemap_comp as tonemap};
 use crate::shared::assert_layout;
 use ash::vk;
@@ -14,13 +14,29 @@ use std::sync::Arc;
 /// a white Lambertian surface facing it would have 0.32.
 pub const REFERENCE_RADIANCE: f32 = 0.36;
 
+/// Irradiance on a surface that faces the sun 45° high, 1000 m above the sea in the default air [W m⁻² nm⁻¹]: the light
+/// that shows white, as on a daylight film. Clouds are then neither yellow nor blue, and the evening stays warm.
+/// (A test of [`crate::reference::atmosphere`] compares it with the air.)
+pub const DAYLIGHT: [f32; 3] = [1.37, 1.55, 1.37];
+
+/// Factors from radiance to the tone curve's input. Without a sky all three channels are treated alike.
+#[must_use]
+pub fn gain(film: &params::Film, model: SkyModel) -> [f32; 3] {
+    let exposure = film.exposure_ev.exp2() / REFERENCE_RADIANCE;
+    match model {
+        SkyModel::None => [exposure; 3],
+        // A white surface in daylight is as bright as one in unit irradiance without a sky.
+        SkyModel::Atmosphere => DAYLIGHT.map(|irradiance| exposure / irradiance),
+    }
+}
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct TonemapPush {
-    exposure: f32,
+    gain: [f32; 3],
     curve: u32,
 }
-assert_layout!(TonemapPush, tonemap_push, { exposure: EXPOSURE, curve: CURVE });
+assert_layout!(TonemapPush, tonemap_push, { gain: GAIN, curve: CURVE });
 
 /// Composites and tones.
 pub struct Film {
@@ -50,14 +66,14 @@ impl Film {
     pub fn record_composite(
         &self,
         rec: &mut Recorder<'_>,
-        targets: &CloudTargets,
+        cloud: &Image,
         low_opaque: &Image,
         opaque_distance: &Image,
         background: &Image,
     ) -> Result<()> {
         let nearest = Sampler::NearestClamp;
         let bindings = composite::Bindings {
-            cloud: targets.cloud.sampled(nearest),
+            cloud: cloud.sampled(nearest),
             low_opaque: low_opaque.sampled(nearest),
             opaque_distance: opaque_distance.sampled(nearest),
             background: background.sampled(nearest),
@@ -68,12 +84,9 @@ impl Film {
     }
 
     /// Tones the composited scene.
-    pub fn record_tonemap(&self, rec: &mut Recorder<'_>, film: &params::Film) -> Result<()> {
+    pub fn record_tonemap(&self, rec: &mut Recorder<'_>, film: &params::Film, model: SkyModel) -> Result<()> {
         let bindings = tonemap::Bindings { scene: self.scene.sampled(Sampler::NearestClamp), picture: &self.picture };
-        let push = TonemapPush {
-            exposure: film.exposure_ev.exp2() / REFERENCE_RADIANCE,
-            curve: u32::from(film.curve == ToneCurve::Linear),
-        };
+        let push = TonemapPush { gain: gain(film, model), curve: u32::from(film.curve == ToneCurve::Linear) };
         let [width, height, _] = self.picture.extent();
         rec.pass("tonemap", |rec| rec.dispatch(&self.tonemap, &bindings, &push, [width, height, 1]))
     }

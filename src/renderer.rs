@@ -5,19 +5,18 @@
 //! allocated or compiled inside a frame; lists that were too small are grown between frames ([`Renderer::finish`]).
 
 use crate::Result;
-use crate::atmosphere::SkyLight;
+use crate::atmosphere::{Air, Atmosphere, Background, CloudShadow};
 use crate::blend::medium::MediumParams;
-use crate::blend::{BlendInputs, Blender, Choice, CloudTargets, NO_CLOUD, Shading, choose, cloud_format};
+use crate::blend::{BlendInputs, Blender, Choice, CloudTargets, Shading, choose};
 use crate::compact::{Compact, frustum_planes};
 use crate::detail::DetailTile;
 use crate::film::Film;
-use crate::gpu::{Buffer, BufferKind, Gpu, Image, ImageDesc, Recorder};
+use crate::gpu::{Buffer, BufferKind, Gpu, Image, Recorder};
 use crate::grid::{CounterReadback, Counters, Grid, GridDesign, ParticleList, ParticleSet};
 use crate::lighting::Lighting;
-use crate::params::{Camera, Params, Source, Style};
+use crate::params::{Camera, Params, SkyModel, Source, Style};
 use crate::shared::FrameParams;
 use crate::tiling::{Slab, Tiling, TilingParams};
-use ash::vk;
 use std::sync::Arc;
 
 /// Radius of the planet at sea level [m].
@@ -60,11 +59,10 @@ pub struct Renderer {
     targets: CloudTargets,
     frame: Vec<Buffer>,
     medium: Buffer,
-    sky_light: Buffer,
+    atmosphere: Atmosphere,
+    background: Background,
+    shadow: CloudShadow,
     film: Film,
-    low_opaque: Image,
-    opaque_distance: Image,
-    background: Image,
     counters: CounterReadback,
 }
 
@@ -109,11 +107,6 @@ impl Renderer {
         let frame = (0..slots)
             .map(|_| Buffer::new(gpu, "frame params", size_of::<FrameParams>() as u64, BufferKind::Upload))
             .collect::<Result<_>>()?;
-        let image = |name, [width, height]: [u32; 2], format| {
-            let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE;
-            Image::new(gpu, &ImageDesc { name, extent: [width, height, 0], format, usage })
-        };
-        let sky_light = SkyLight { sun_irradiance_clouds: params.sun.irradiance, ..bytemuck::Zeroable::zeroed() };
         Ok(Self {
             compact: Compact::new(gpu, set.capacity())?,
             tiling: Tiling::new(gpu, levels, set.capacity(), set.capacity().saturating_mul(NODES_PER_PARTICLE), slots)?,
@@ -124,11 +117,10 @@ impl Renderer {
             targets: CloudTargets::new(gpu, low_extent, quality.precision)?,
             frame,
             medium: Buffer::upload(gpu, "medium", &[MediumParams::new(&params.clouds)])?,
-            sky_light: Buffer::upload(gpu, "sky light", &[sky_light])?,
+            atmosphere: Atmosphere::new(gpu, params.sky.model, &Air::of(&params.sky, &params.sun))?,
+            background: Background::new(gpu, params.sky.model, extent, quality.downscale, quality.precision)?,
+            shadow: CloudShadow::new(gpu)?,
             film: Film::new(gpu, extent, quality.precision)?,
-            low_opaque: image("low opaque distance", low_extent, vk::Format::R32_SFLOAT)?,
-            opaque_distance: image("opaque distance", extent, vk::Format::R32_SFLOAT)?,
-            background: image("background", extent, cloud_format(quality.precision))?,
             counters: CounterReadback::new(gpu, slots)?,
             params: params.clone(),
             extent,
@@ -216,28 +208,33 @@ impl Renderer {
         };
         // The sun's irradiance above the clouds is multiplied in by the shading: here it is a transmittance.
         rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid, [1.0; 3]))?;
-        for distance in [&self.low_opaque, &self.opaque_distance] {
-            rec.clear_image(distance, [NO_CLOUD; 4]);
+        let (frame_buffer, model) = (&self.frame[slot], self.params.sky.model);
+        self.atmosphere.record_luts(rec, frame_buffer, self.params.clouds.altitude)?;
+        if model == SkyModel::Atmosphere {
+            self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera)?;
         }
-        rec.clear_image(&self.background, [0.0; 4]);
+        let (atmosphere, background) = (&self.atmosphere, &self.background);
+        background.record_opaque(rec, atmosphere, frame_buffer)?;
+        background.record(rec, atmosphere, frame_buffer, &self.shadow)?;
         let inputs = BlendInputs {
             frame: &self.frame[slot],
             particles: self.set.particles(),
             order: self.compact.order(),
             lights: self.set.lights(),
             medium: &self.medium,
-            sky_light: &self.sky_light,
+            sky_light: atmosphere.sky_light(),
             optical_depth_lut: tables.optical_depth,
             scattering_lut: tables.scattering,
             detail_tile: &self.detail.image,
-            opaque_distance: &self.low_opaque,
+            opaque_distance: &background.low_opaque,
             draw_args: self.compact.args(),
             draw_args_offset: Compact::DRAW_ARGS,
         };
         self.blender.record(rec, &inputs, &self.targets)?;
+        let cloud = background.record_cloud_air(rec, atmosphere, frame_buffer, &self.targets)?;
         let film = &self.film;
-        film.record_composite(rec, &self.targets, &self.low_opaque, &self.opaque_distance, &self.background)?;
-        film.record_tonemap(rec, &self.params.film)?;
+        film.record_composite(rec, cloud, &background.low_opaque, &background.opaque_distance, &background.radiance)?;
+        film.record_tonemap(rec, &self.params.film, model)?;
         self.counters.record(rec, &self.set);
         Ok(())
     }

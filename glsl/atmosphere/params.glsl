@@ -2,7 +2,7 @@
 #ifndef ATMOSPHERE_PARAMS_GLSL
 #define ATMOSPHERE_PARAMS_GLSL
 
-// Three wavelengths (680, 550, 440 nm) stand for linear sRGB. Irradiance is relative to the sun outside the atmosphere.
+// Three wavelengths (680, 550, 440 nm) stand for linear sRGB. Irradiance is in W m⁻² nm⁻¹.
 struct AirParams {
     vec3 rayleigh_scattering;    // at sea level [1/m]
     float rayleigh_scale_height; // [m]
@@ -12,7 +12,7 @@ struct AirParams {
     float mie_g;                 // asymmetry of its Cornette–Shanks phase function [1]
     vec3 ozone_absorption;       // at the layer's centre [1/m]
     float ozone_centre;          // altitude [m]
-    vec3 solar_irradiance;       // outside the atmosphere, facing the sun [1]
+    vec3 solar_irradiance;       // outside the atmosphere, facing the sun [W m⁻² nm⁻¹]
     float ozone_half_width;      // from the layer's centre to zero [m]
     vec3 ground_albedo;          // diffuse, as the air sees it from afar [1]
     float bottom_radius;         // of the planet at sea level [m]

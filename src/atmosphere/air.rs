@@ -1,12 +1,13 @@
 //! What the clear air is made of: the host's parameters and their device twin.
 
+use crate::params;
+use crate::shared::assert_layout;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 
 /// Clear air over a spherical planet, at three wavelengths that stand for linear sRGB (680, 550 and 440 nm).
 ///
-/// Irradiance and radiance are relative to the sun outside the atmosphere: [`Air::solar_irradiance`] = 1 means "the
-/// solar constant, white-balanced".
+/// Irradiance and radiance are in the unit of [`Air::solar_irradiance`]: W m⁻² nm⁻¹ and W m⁻² sr⁻¹ nm⁻¹.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
     /// Radius of the planet at sea level \[m\].
@@ -31,7 +32,7 @@ pub struct Air {
     pub ozone_centre: f64,
     /// Distance from that centre to where the tent-shaped ozone density is zero \[m\].
     pub ozone_half_width: f64,
-    /// Irradiance on a plane facing the sun outside the atmosphere, relative \[1\].
+    /// Irradiance on a plane facing the sun outside the atmosphere \[W m⁻² nm⁻¹\].
     pub solar_irradiance: [f64; 3],
     /// Angular radius of the sun \[rad\].
     pub sun_angular_radius: f64,
@@ -43,8 +44,7 @@ impl Default for Air {
     /// Mid-latitude air on a fair summer day.
     ///
     /// Rayleigh and ozone are the values of Hillaire 2020 (after Bruneton 2017); the aerosol is that of Bruneton 2008
-    /// with an albedo of 0.9. The sun outside the atmosphere is taken as white: its chromaticity (5800 K) is within a
-    /// few percent of sRGB's D65, and what is left is the camera's white balance (see [`crate::tonemap`]).
+    /// with an albedo of 0.9, the sun that of the ASTM G173 extraterrestrial spectrum.
     fn default() -> Self {
         Self {
             bottom_radius: 6.36e6,
@@ -58,7 +58,7 @@ impl Default for Air {
             ozone_absorption: [0.650e-6, 1.881e-6, 0.085e-6],
             ozone_centre: 25e3,
             ozone_half_width: 15e3,
-            solar_irradiance: [1.0; 3],
+            solar_irradiance: [1.474, 1.8504, 1.91198],
             sun_angular_radius: 0.004675,
             ground_albedo: [0.10, 0.11, 0.07],
         }
@@ -66,6 +66,21 @@ impl Default for Air {
 }
 
 impl Air {
+    /// Air as a scene describes it: the default with the scene's haze, ground and sun.
+    #[must_use]
+    pub fn of(sky: &params::Sky, sun: &params::Sun) -> Self {
+        let air = Self::default();
+        let haze = f64::from(sky.haze);
+        Self {
+            mie_scattering: air.mie_scattering.map(|c| c * haze),
+            mie_extinction: air.mie_extinction.map(|c| c * haze),
+            ground_albedo: sky.ground_albedo.map(f64::from),
+            solar_irradiance: sun.irradiance.map(f64::from),
+            sun_angular_radius: f64::from(sun.angular_radius).to_radians(),
+            ..air
+        }
+    }
+
     /// Checks every field; the error names the first that cannot be used.
     pub fn validate(&self) -> Result<()> {
         let positive = |name: &str, value: f64| {
@@ -154,11 +169,18 @@ pub struct AirParams {
     pub reserved_a: f32,
     pub reserved_b: f32,
 }
+assert_layout!(AirParams, air_params, {
+    rayleigh_scattering: RAYLEIGH_SCATTERING, rayleigh_scale_height: RAYLEIGH_SCALE_HEIGHT,
+    mie_scattering: MIE_SCATTERING, mie_scale_height: MIE_SCALE_HEIGHT, mie_extinction: MIE_EXTINCTION, mie_g: MIE_G,
+    ozone_absorption: OZONE_ABSORPTION, ozone_centre: OZONE_CENTRE, solar_irradiance: SOLAR_IRRADIANCE,
+    ozone_half_width: OZONE_HALF_WIDTH, ground_albedo: GROUND_ALBEDO, bottom_radius: BOTTOM_RADIUS,
+    top_height: TOP_HEIGHT, sun_angular_radius: SUN_ANGULAR_RADIUS, reserved_a: RESERVED_A, reserved_b: RESERVED_B,
+});
 
 /// The light that the sky and the sun give to clouds and ground this frame, computed on the device.
 ///
-/// All are irradiances relative to the sun outside the atmosphere; with `[sky] model = "none"` the sun's is exactly 1
-/// and everything else exactly 0.
+/// All are irradiances \[W m⁻² nm⁻¹\]; with `[sky] model = "none"` the sun's is exactly [`Air::solar_irradiance`] and
+/// everything else exactly 0.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -179,6 +201,13 @@ pub struct SkyLight {
     pub sky_irradiance_ground: [f32; 3],
     pub reserved_e: f32,
 }
+assert_layout!(SkyLight, sky_light, {
+    sun_irradiance_clouds: SUN_IRRADIANCE_CLOUDS, reserved_a: RESERVED_A,
+    sky_irradiance_clouds: SKY_IRRADIANCE_CLOUDS, reserved_b: RESERVED_B,
+    ground_irradiance_clouds: GROUND_IRRADIANCE_CLOUDS, reserved_c: RESERVED_C,
+    sun_irradiance_ground: SUN_IRRADIANCE_GROUND, reserved_d: RESERVED_D,
+    sky_irradiance_ground: SKY_IRRADIANCE_GROUND, reserved_e: RESERVED_E,
+});
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,27 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Sun's transmittance of the clouds for points of the ground around the camera, by walking their light tiles' lists
+// (Yusov 5.3). Cost: one list a texel.
+#include "atmosphere/shadow_map.glsl"
+#include "tiling/tile.glsl"
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 0, std430) readonly restrict buffer TilingParamsBuffer { TilingParams tiling; } params;
+layout(binding = 1, std430) readonly restrict buffer Particles { Particle particle[]; } particles;
+layout(binding = 2, std430) readonly restrict buffer TileHeads { uint head[]; } tile_heads;
+layout(binding = 3, std430) readonly restrict buffer TileNodes { TileNode node[]; } tile_nodes;
+layout(binding = 4, r16f) writeonly restrict uniform image2D cloud_shadow;
+layout(push_constant) uniform CloudShadowPush {
+    vec2 centre;  // of the map, relative to the floating origin [m]
+    float extent; // half its side [m]
+    float reserved;
+} push;
+#include "lighting/sun_optical_depth.glsl"
+
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy), size = imageSize(cloud_shadow);
+    if (any(greaterThanEqual(texel, size))) return;
+    vec2 offset = offset_from_shadow_map(2.0 * (vec2(texel) + 0.5) / vec2(size) - 1.0, push.extent);
+    float drop = dot(offset, offset) * params.tiling.inverse_diameter; // the planet falls away
+    vec2 p = push.centre + offset;
+    imageStore(cloud_shadow, texel, vec4(exp(-sun_optical_depth(vec3(p.x, -drop, p.y)))));
+}

@@ -1,0 +1,149 @@
+//! What is behind and in front of the clouds: sky and ground with their distance, and the air before the clouds.
+
+use super::{Atmosphere, CloudShadow};
+use crate::Result;
+use crate::blend::{CloudTargets, NO_CLOUD, cloud_format};
+use crate::gpu::{Buffer, ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
+use crate::params::{Precision, SkyModel};
+use crate::shaders::{
+    atmosphere_background_comp as background, atmosphere_cloud_air_comp as cloud_air,
+    atmosphere_opaque_distance_comp as opaque_distance, atmosphere_opaque_reduce_comp as opaque_reduce,
+};
+use crate::shared::assert_layout;
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    shadow_centre: [f32; 2],
+    shadow_extent: f32,
+    reserved: f32,
+}
+assert_layout!(Push, background_push, {
+    shadow_centre: SHADOW_CENTRE, shadow_extent: SHADOW_EXTENT, reserved: RESERVED,
+});
+
+/// The scene without clouds, and the clouds with air in front. Without a sky everything here is black, infinitely far,
+/// and clear.
+pub struct Background {
+    model: SkyModel,
+    downscale: u32,
+    distance: ComputePipeline,
+    reduce: ComputePipeline,
+    background: ComputePipeline,
+    air: ComputePipeline,
+    /// Distance along the ray to the opaque scene \[m\], 1e30 for none; full resolution.
+    pub opaque_distance: Image,
+    /// The same at the resolution of the cloud targets: nearest and farthest of each block in turn.
+    pub low_opaque: Image,
+    /// Linear radiance of sky, sun and ground, the air in front of them included; full resolution.
+    pub radiance: Image,
+    cloud_in_air: Image,
+}
+
+impl Background {
+    /// Pipelines and images for frames of `extent` pixels, whose cloud targets are `downscale` times smaller.
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        model: SkyModel,
+        extent: [u32; 2],
+        downscale: u32,
+        precision: Precision,
+    ) -> Result<Self> {
+        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE;
+        let image =
+            |name, [w, h]: [u32; 2], format| Image::new(gpu, &ImageDesc { name, extent: [w, h, 0], format, usage });
+        let low_extent = extent.map(|pixels| pixels.div_ceil(downscale));
+        Ok(Self {
+            model,
+            downscale,
+            distance: ComputePipeline::new(gpu, &opaque_distance::PROGRAM, &[])?,
+            reduce: ComputePipeline::new(gpu, &opaque_reduce::PROGRAM, &[])?,
+            background: ComputePipeline::new(gpu, &background::PROGRAM, &[])?,
+            air: ComputePipeline::new(gpu, &cloud_air::PROGRAM, &[])?,
+            opaque_distance: image("opaque distance", extent, vk::Format::R32_SFLOAT)?,
+            low_opaque: image("low opaque distance", low_extent, vk::Format::R32_SFLOAT)?,
+            radiance: image("background", extent, cloud_format(precision))?,
+            cloud_in_air: image("cloud in air", low_extent, cloud_format(precision))?,
+        })
+    }
+
+    /// Finds the opaque scene, which is the bare planet; before `blend`.
+    pub fn record_opaque(&self, rec: &mut Recorder<'_>, atmosphere: &Atmosphere, frame: &Buffer) -> Result<()> {
+        if self.model == SkyModel::None {
+            rec.clear_image(&self.opaque_distance, [NO_CLOUD; 4]);
+            rec.clear_image(&self.low_opaque, [NO_CLOUD; 4]);
+            return Ok(());
+        }
+        rec.pass("opaque", |rec| {
+            let bindings =
+                opaque_distance::Bindings { air: &atmosphere.air, frame, opaque_distance: &self.opaque_distance };
+            let [w, h, _] = self.opaque_distance.extent();
+            rec.dispatch(&self.distance, &bindings, &(), [w, h, 1])?;
+            let bindings = opaque_reduce::Bindings {
+                opaque_distance: self.opaque_distance.sampled(Sampler::NearestClamp),
+                opaque_low: &self.low_opaque,
+            };
+            let [w, h, _] = self.low_opaque.extent();
+            rec.dispatch(&self.reduce, &bindings, &self.downscale, [w, h, 1])
+        })
+    }
+
+    /// Fills [`Self::radiance`].
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        atmosphere: &Atmosphere,
+        frame: &Buffer,
+        shadow: &CloudShadow,
+    ) -> Result<()> {
+        if self.model == SkyModel::None {
+            rec.clear_image(&self.radiance, [0.0; 4]);
+            return Ok(());
+        }
+        let linear = |image| Image::sampled(image, Sampler::LinearClamp);
+        let bindings = background::Bindings {
+            air: &atmosphere.air,
+            frame,
+            sky_light: atmosphere.sky_light(),
+            transmittance_lut: linear(&atmosphere.transmittance),
+            sky_view_smooth: linear(&atmosphere.sky_view_smooth),
+            sky_view_aerosol: linear(&atmosphere.sky_view_aerosol),
+            cloud_shadow: linear(&shadow.image),
+            radiance: &self.radiance,
+        };
+        let (shadow_centre, shadow_extent) = shadow.place();
+        let push = Push { shadow_centre, shadow_extent, reserved: 0.0 };
+        let [w, h, _] = self.radiance.extent();
+        rec.pass("background", |rec| rec.dispatch(&self.background, &bindings, &push, [w, h, 1]))
+    }
+
+    /// Puts the air in front of the clouds, after `blend`; the result takes the place of `targets.cloud`.
+    pub fn record_cloud_air<'a>(
+        &'a self,
+        rec: &mut Recorder<'_>,
+        atmosphere: &Atmosphere,
+        frame: &Buffer,
+        targets: &'a CloudTargets,
+    ) -> Result<&'a Image> {
+        if self.model == SkyModel::None {
+            return Ok(&targets.cloud);
+        }
+        let linear = |image| Image::sampled(image, Sampler::LinearClamp);
+        let bindings = cloud_air::Bindings {
+            air: &atmosphere.air,
+            frame,
+            smooth_table: linear(&atmosphere.aerial_smooth),
+            aerosol_table: linear(&atmosphere.aerial_aerosol),
+            extinction_table: linear(&atmosphere.aerial_extinction),
+            cloud: targets.cloud.sampled(Sampler::NearestClamp),
+            nearest: targets.nearest.sampled(Sampler::NearestClamp),
+            cloud_in_air: &self.cloud_in_air,
+        };
+        let [w, h, _] = self.cloud_in_air.extent();
+        rec.pass("cloud air", |rec| rec.dispatch(&self.air, &bindings, &self.downscale, [w, h, 1]))?;
+        Ok(&self.cloud_in_air)
+    }
+}

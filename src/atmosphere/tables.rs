@@ -1,0 +1,146 @@
+//! Fills the tables of the clear air and computes its light on clouds and ground.
+
+use super::{Air, SkyLight};
+use crate::Result;
+use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
+use crate::params::SkyModel;
+use crate::shaders::{
+    atmosphere_aerial_comp as aerial, atmosphere_multiple_comp as multiple, atmosphere_sky_light_comp as sky_light,
+    atmosphere_sky_view_comp as sky_view, atmosphere_transmittance_comp as transmittance,
+};
+use ash::vk;
+use std::sync::Arc;
+
+/// Texels of the transmittance table, by direction and altitude.
+pub const TRANSMITTANCE_SIZE: [u32; 2] = [256, 64];
+/// Texels of the multiple-scattering table, by sun and altitude.
+pub const MULTIPLE_SIZE: [u32; 2] = [32, 32];
+/// Texels of the sky view, by azimuth and elevation (half of the rows below the horizon).
+pub const SKY_VIEW_SIZE: [u32; 2] = [64, 192];
+/// Texels of the aerial perspective, by azimuth, elevation (odd: one row is horizontal) and distance.
+pub const AERIAL_SIZE: [u32; 3] = [32, 65, 32];
+
+/// The tables of one sky, and what fills them.
+pub struct Atmosphere {
+    model: SkyModel,
+    filled: bool,
+    fill_transmittance: ComputePipeline,
+    fill_multiple: ComputePipeline,
+    fill_sky_view: ComputePipeline,
+    fill_aerial: ComputePipeline,
+    fill_sky_light: ComputePipeline,
+    pub(crate) air: Buffer,
+    sky_light: Buffer,
+    /// Transmittance to the top of the atmosphere.
+    pub transmittance: Image,
+    /// Multiply scattered radiance.
+    pub multiple: Image,
+    /// Airlight along whole rays: Rayleigh and multiple scattering.
+    pub sky_view_smooth: Image,
+    /// Airlight along whole rays: aerosol, without its phase function.
+    pub sky_view_aerosol: Image,
+    /// Mean in-scattering up to a distance: Rayleigh and multiple scattering.
+    pub aerial_smooth: Image,
+    /// Mean in-scattering up to a distance: aerosol, without its phase function.
+    pub aerial_aerosol: Image,
+    /// Mean extinction up to a distance.
+    pub aerial_extinction: Image,
+}
+
+fn table(gpu: &Arc<Gpu>, name: &'static str, extent: [u32; 3]) -> Result<Image> {
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE;
+    Image::new(gpu, &ImageDesc { name, extent, format: vk::Format::R16G16B16A16_SFLOAT, usage })
+}
+
+impl Atmosphere {
+    /// Pipelines and empty tables.
+    ///
+    /// # Errors
+    /// A field of `air` that cannot be used, or what Vulkan says.
+    pub fn new(gpu: &Arc<Gpu>, model: SkyModel, air: &Air) -> Result<Self> {
+        air.validate()?;
+        let flat = |size: [u32; 2]| [size[0], size[1], 0];
+        let model_constant = [("SKY_MODEL", u32::from(model == SkyModel::Atmosphere))];
+        Ok(Self {
+            model,
+            filled: false,
+            fill_transmittance: ComputePipeline::new(gpu, &transmittance::PROGRAM, &[])?,
+            fill_multiple: ComputePipeline::new(gpu, &multiple::PROGRAM, &[])?,
+            fill_sky_view: ComputePipeline::new(gpu, &sky_view::PROGRAM, &[])?,
+            fill_aerial: ComputePipeline::new(gpu, &aerial::PROGRAM, &[])?,
+            fill_sky_light: ComputePipeline::new(gpu, &sky_light::PROGRAM, &model_constant)?,
+            air: Buffer::upload(gpu, "air", &[air.to_device()])?,
+            sky_light: Buffer::new(gpu, "sky light", size_of::<SkyLight>() as u64, BufferKind::Device)?,
+            transmittance: table(gpu, "air transmittance", flat(TRANSMITTANCE_SIZE))?,
+            multiple: table(gpu, "air multiple scattering", flat(MULTIPLE_SIZE))?,
+            sky_view_smooth: table(gpu, "sky view, smooth", flat(SKY_VIEW_SIZE))?,
+            sky_view_aerosol: table(gpu, "sky view, aerosol", flat(SKY_VIEW_SIZE))?,
+            aerial_smooth: table(gpu, "aerial perspective, smooth", AERIAL_SIZE)?,
+            aerial_aerosol: table(gpu, "aerial perspective, aerosol", AERIAL_SIZE)?,
+            aerial_extinction: table(gpu, "aerial extinction", flat([AERIAL_SIZE[1], AERIAL_SIZE[2]]))?,
+        })
+    }
+
+    /// Which sky this is.
+    #[must_use]
+    pub fn model(&self) -> SkyModel {
+        self.model
+    }
+
+    /// [`SkyLight`], filled by [`Self::record_luts`].
+    #[must_use]
+    pub fn sky_light(&self) -> &Buffer {
+        &self.sky_light
+    }
+
+    /// Fills what depends on the frame (and once what does not): sky view, aerial perspective, light on clouds and
+    /// ground. `frame` holds [`FrameParams`](crate::shared::FrameParams), `cloud_altitude` is where the clouds' light is
+    /// taken \[m\]. With no sky only the light is written.
+    pub fn record_luts(&mut self, rec: &mut Recorder<'_>, frame: &Buffer, cloud_altitude: f32) -> Result<()> {
+        let linear = |image| Image::sampled(image, Sampler::LinearClamp);
+        rec.pass("atmosphere", |rec| {
+            if self.model == SkyModel::Atmosphere {
+                if !self.filled {
+                    let [w, h] = TRANSMITTANCE_SIZE;
+                    let bindings = transmittance::Bindings { air: &self.air, table: &self.transmittance };
+                    rec.dispatch(&self.fill_transmittance, &bindings, &(), [w, h, 1])?;
+                    let [w, h] = MULTIPLE_SIZE;
+                    let bindings = multiple::Bindings {
+                        air: &self.air,
+                        transmittance_lut: linear(&self.transmittance),
+                        table: &self.multiple,
+                    };
+                    rec.dispatch(&self.fill_multiple, &bindings, &(), [w, h, 1])?;
+                    self.filled = true;
+                }
+                let bindings = sky_view::Bindings {
+                    air: &self.air,
+                    frame,
+                    transmittance_lut: linear(&self.transmittance),
+                    multiple_lut: linear(&self.multiple),
+                    smooth_table: &self.sky_view_smooth,
+                    aerosol_table: &self.sky_view_aerosol,
+                };
+                rec.dispatch(&self.fill_sky_view, &bindings, &(), [SKY_VIEW_SIZE[0], SKY_VIEW_SIZE[1], 1])?;
+                let bindings = aerial::Bindings {
+                    air: &self.air,
+                    frame,
+                    transmittance_lut: linear(&self.transmittance),
+                    multiple_lut: linear(&self.multiple),
+                    smooth_table: &self.aerial_smooth,
+                    aerosol_table: &self.aerial_aerosol,
+                    extinction_table: &self.aerial_extinction,
+                };
+                rec.dispatch(&self.fill_aerial, &bindings, &(), [AERIAL_SIZE[0], AERIAL_SIZE[1], 1])?;
+            }
+            let bindings = sky_light::Bindings {
+                air: &self.air,
+                frame,
+                transmittance_lut: linear(&self.transmittance),
+                multiple_lut: linear(&self.multiple),
+                sky_light: &self.sky_light,
+            };
+            rec.dispatch(&self.fill_sky_light, &bindings, &cloud_altitude, [1, 1, 1])
+        })
+    }
+}
