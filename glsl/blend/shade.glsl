@@ -36,7 +36,7 @@ vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sample
     // Single scattering: of the homogeneous sphere in which this chord has this optical depth.
     float radius_single = tau_chord / (2.0 * mu);
     // Multiple scattering is a matter of the whole particle.
-    float radius_multiple = frame.sigma_t * p.density * p.fade * frame.fill * ray.metres;
+    float radius_multiple = frame.sigma_t * p.density * p.fade * frame.fill * ray.metres * 5.0;
     float single = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_single).x;
     float multiple = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_multiple).y;
     float p_sun = phase(dot(frame.to_sun, dir), medium.g_single, medium.phase_function);

@@ -5,8 +5,8 @@
 #define DETAIL_DISPLACE
 
 const float DETAIL_LACUNARITY = 2.37;    // ratio of successive wavelengths; irrational enough not to line up (tuned)
-const float DETAIL_FIRST = 1.3;         // longest wavelength, in particle radii (tuned)
-const float DETAIL_HEIGHT = 0.30;       // height of a bump, in wavelengths (tuned)
+const float DETAIL_FIRST = 1.6;         // longest wavelength, in particle radii (tuned)
+const float DETAIL_HEIGHT = 0.26;       // height of a bump, in wavelengths (tuned)
 const int   DETAIL_OCTAVES = 4;
 const float DETAIL_TILE_CELLS = 8.0;     // BILLOW_CELLS: wavelength = tile / cells
 

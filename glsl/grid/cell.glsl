@@ -103,7 +103,7 @@ CellShape unpack_shape(vec4 stored) {
 CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
     CellShape shape = CellShape(0u, 0u, 0.0, 0.0, 0.0);
     shape.weight = ring_weight(place.centre, place.ring, p);
-    if (!(shape.weight > 0.0) || !(coverage > 0.0)) return shape;
+    if ((!(shape.weight > 0.0) && place.ring != 1u) || !(coverage > 0.0)) return shape;
     int steps = p.ring_first[place.ring].w;
     ivec2 position = place.absolute * steps + (steps >> 1);
     FieldFrequencies f = field_frequencies(p);
@@ -124,12 +124,20 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
     precise float height = fraction * p.thickness;
     precise float steps_up = height * p.ring_layer[place.ring].y;
     shape.layers = uint(clamp(int(ceil(steps_up)), 1, p.ring_first[place.ring].z));
-    shape.body = min(excess * 3.0, 1.0);
+    shape.body = min(excess * 5.0, 1.0);
     // Billows where a cell is near enough to show them: two at the outline, one on every other column inside.
     if (p.ring_frame[place.ring].z < 400.0) {
         shape.puffs = shape.body < 1.0 ? 2u : hash_lattice(place.absolute, p.seed + 15u) & 1u;
     }
     shape.height = height;
+    if (place.ring == 1u) {
+        // Coarse particles go on inside the finer ring, as cores of the bodies that its particles cover.
+        precise float depth = (excess - 0.22) * 4.0;
+        precise float reach_here = ring_reach(place.centre, place.ring, p);
+        precise float core = reach_here * smooth_unit(depth);
+        shape.weight = max(shape.weight, core);
+        if (!(shape.weight > 0.0)) { shape.layers = 0u; shape.puffs = 0u; }
+    }
     return shape;
 }
 

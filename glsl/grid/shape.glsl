@@ -35,14 +35,16 @@ Ball column_ball(CellPlace place, CellShape shape, uint layer, in GridParams p) 
     float up = (float(layer) + 0.5) / float(shape.layers);
 
     // Narrow tops, wide bottoms; small at the outline, and a few much larger than the others: billows of many sizes.
-    // A layer's step is 0.9 of its particles' height.
+    // Neighbours overlap deeply, or the detail noise would open gaps between them.
     float taper = 1.0 - 0.42 * up * up;
-    float outline = 0.55 + 0.45 * shape.body;
+    float outline = 0.45 + 0.55 * shape.body;
     float rare = float(h0 & 255u) / 256.0;
     float size = 0.8 + 0.3 * unit_float(h0) + 0.45 * (rare * rare) * (rare * rare);
-    ball.across = edge * 0.74 * taper * outline * size;
-    float tall = 0.5 * step / 0.9 * (0.95 + 0.3 * unit_float(h1));
-    ball.tall = max(tall, 0.35 * ball.across);
+    ball.across = edge * 1.2 * taper * outline * size;
+    // The lowest layer stays flat: its undersides are the cloud's base.
+    float tall = max(0.62 * step, 0.8 * ball.across) * (0.9 + 0.25 * unit_float(h1));
+    if (layer == 0u) tall = min(tall, 0.8 * step);
+    ball.tall = tall;
 
     // Horizontal jitter ±0.4 cells, vertical ±0.15 of the height; the lowest layer stays near its plane.
     float jitter = layer == 0u ? 0.03 : 0.15;
@@ -94,7 +96,7 @@ Particle column_particle(CellPlace place, CellShape shape, uint index, in GridPa
 
     Particle particle;
     particle.centre = ball.centre;
-    particle.density = p.density * (0.35 + 0.65 * shape.body);
+    particle.density = p.density * (0.2 + 0.8 * shape.body);
     particle.rotation = rotation;
     particle.semi_axes = semi_axes;
     particle.fade = shape.weight;

@@ -202,10 +202,10 @@ impl GridDesign {
     /// No particle reaches farther from its centre than this [m].
     #[must_use]
     pub fn greatest_extent(&self) -> f32 {
-        // shape.glsl: 0.74 cells across, × 1.55 size, × 1.12; or as tall as a layer: 0.5 / 0.9 × 1.25 steps.
+        // shape.glsl: 1.2 cells across, × 1.55 size, × 1.12; upwards × 1.15 of 0.8 times that, or of 0.62 steps.
         let last = self.fixed.ring_count as usize - 1;
-        let across = self.cell_edge as f32 * (1u32 << last) as f32 * (0.74 * 1.55 * 1.12);
-        let tall = (0..=last).map(|ring| self.fixed.ring_layer[ring][0]).fold(0.0, f32::max) * (0.5 / 0.9 * 1.25);
+        let across = self.cell_edge as f32 * (1u32 << last) as f32 * (1.2 * 1.55 * 1.12);
+        let tall = (0..=last).map(|ring| self.fixed.ring_layer[ring][0]).fold(0.0, f32::max) * (0.62 * 1.15);
         across.max(tall) * 1.01
     }
 

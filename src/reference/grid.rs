@@ -70,7 +70,8 @@ fn ring_reach(centre: [f32; 2], ring: u32, p: &GridParams) -> f32 {
     1.0 - smooth_unit((cells - start) * 0.25)
 }
 
-/// Share of the cloud that ring `ring` shows at `centre`; the shares of all rings add up to 1 within the cut-off.
+/// Share of the cloud that ring `ring` shows at `centre`; the shares of all rings add up to 1 within the cut-off, not
+/// counting the cores that ring 1 keeps inside the bodies of ring 0.
 #[must_use]
 pub fn ring_weight(centre: [f32; 2], ring: u32, p: &GridParams) -> f32 {
     let reach = ring_reach(centre, ring, p);
@@ -118,7 +119,7 @@ fn cell_position(place: &CellPlace, p: &GridParams) -> [i32; 2] {
 pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape {
     let weight = ring_weight(place.centre, place.ring, p);
     let empty = CellShape { weight, ..CellShape::default() };
-    if weight <= 0.0 || coverage <= 0.0 {
+    if (weight <= 0.0 && place.ring != 1) || coverage <= 0.0 {
         return empty;
     }
     let position = cell_position(place, p);
@@ -135,7 +136,7 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     let height = fraction * p.thickness;
     let steps_up = height * p.ring_layer[place.ring as usize][1];
     let layers = (steps_up.ceil() as i32).clamp(1, p.ring_first[place.ring as usize][2]) as u32;
-    let body = (excess * 3.0).min(1.0);
+    let body = (excess * 5.0).min(1.0);
     let near = p.ring_frame[place.ring as usize][2] < 400.0;
     let chance = hash_lattice(place.absolute, p.seed.wrapping_add(15)) & 1;
     let puffs = match (near, body < 1.0) {
@@ -143,6 +144,13 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
         (true, true) => 2,
         (true, false) => chance,
     };
+    let mut weight = weight;
+    if place.ring == 1 {
+        weight = weight.max(ring_reach(place.centre, 1, p) * smooth_unit((excess - 0.22) * 4.0));
+        if weight <= 0.0 {
+            return CellShape { height, body, weight, ..CellShape::default() };
+        }
+    }
     CellShape { layers, puffs, height, body, weight }
 }
 
@@ -186,8 +194,9 @@ fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams)
 
     let rare = (h[0] & 255) as f32 / 256.0;
     let size = 0.8 + 0.3 * unit_float(h[0]) + 0.45 * (rare * rare) * (rare * rare);
-    let across = edge * 0.74 * (1.0 - 0.42 * up * up) * (0.55 + 0.45 * shape.body) * size;
-    let tall = 0.5 * step / 0.9 * (0.95 + 0.3 * unit_float(h[1]));
+    let across = edge * 1.2 * (1.0 - 0.42 * up * up) * (0.45 + 0.55 * shape.body) * size;
+    let tall = (0.62 * step).max(0.8 * across) * (0.9 + 0.25 * unit_float(h[1]));
+    let tall = if layer == 0 { tall.min(0.8 * step) } else { tall };
 
     let jitter = if layer == 0 { 0.03 } else { 0.15 };
     let x = place.centre[0] + signed_float(h[2]) * (0.4 * edge);
@@ -195,7 +204,7 @@ fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams)
     let (dx, dz) = (x - p.camera[0], z - p.camera[2]);
     let base = p.altitude - (dx * dx + dz * dz) * p.inverse_diameter;
     let y = base + (layer as f32 + 0.5) * step + signed_float(h[4]) * jitter * 2.0 * tall;
-    Ball { centre: [x, y, z], across, tall: tall.max(0.35 * across), id, hash: h[5] }
+    Ball { centre: [x, y, z], across, tall, id, hash: h[5] }
 }
 
 /// Layer that carries a puff with hash `id`.
@@ -237,7 +246,7 @@ pub fn column_particle(place: &CellPlace, shape: &CellShape, index: u32, p: &Gri
     };
     Particle {
         centre: ball.centre,
-        density: p.density * (0.35 + 0.65 * shape.body),
+        density: p.density * (0.2 + 0.8 * shape.body),
         rotation,
         semi_axes,
         fade: shape.weight,

@@ -100,7 +100,7 @@ impl Stages {
         Self {
             grid: Grid::new(gpu, &setup.design(), &setup.clouds.coverage, slots).unwrap(),
             compact: Compact::new(gpu, set.capacity()).unwrap(),
-            tiling: Tiling::new(gpu, setup.quality.rings, set.capacity(), 1 << 20, slots).unwrap(),
+            tiling: Tiling::new(gpu, setup.quality.rings, set.capacity(), 1 << 22, slots).unwrap(),
             lighting: Lighting::new(gpu, set.capacity()).unwrap(),
             counters: CounterReadback::new(gpu, slots).unwrap(),
             set,
