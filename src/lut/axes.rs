@@ -61,8 +61,34 @@ pub const LEVELS: u32 = 8;
 pub const R_MIN: f64 = 0.4;
 /// Optical radius of the last level. Colours are constant beyond.
 pub const R_MAX: f64 = 102.4;
-/// Optical depth below which chords are spaced evenly, above it geometrically (tuned).
-pub const MU_SCALE: f64 = 1.0;
+/// Optical depth up to which chords are spaced evenly, above it geometrically (tuned: least interpolation error).
+pub const MU_SCALE: f64 = 3.0;
+/// Zenith cosine at which the spacing changes from chords to impact parameters, which then are even: the middle of the
+/// ball, seen from the eye, is a disc like any other. The impact parameter there is 0.8.
+pub const MU_SPLIT: f64 = 0.6;
+/// Share of the axis that lies below [`MU_SPLIT`].
+const MU_SPLIT_AT: f64 = 0.6;
+
+/// Axis position 0..=1 of a zenith cosine.
+fn mu_to_axis(mu: f64, optical_radius: f64) -> f64 {
+    let full = 2.0 * optical_radius * MU_SPLIT / MU_SCALE;
+    if mu <= MU_SPLIT {
+        MU_SPLIT_AT * (full * mu / MU_SPLIT).asinh() / full.asinh()
+    } else {
+        1.0 - (1.0 - MU_SPLIT_AT) * (1.0 - mu * mu).max(0.0).sqrt() / (1.0 - MU_SPLIT * MU_SPLIT).sqrt()
+    }
+}
+
+/// Inverse of [`mu_to_axis`].
+fn axis_to_mu(t: f64, optical_radius: f64) -> f64 {
+    let full = 2.0 * optical_radius * MU_SPLIT / MU_SCALE;
+    if t <= MU_SPLIT_AT {
+        MU_SPLIT * (t / MU_SPLIT_AT * full.asinh()).sinh() / full
+    } else {
+        let b = (1.0 - MU_SPLIT * MU_SPLIT).sqrt() * (1.0 - t) / (1.0 - MU_SPLIT_AT);
+        (1.0 - b * b).sqrt()
+    }
+}
 
 impl ScatteringShape {
     /// 32 × 64 × 16 (× 8 levels), as in Yusov 5.1.
@@ -93,18 +119,16 @@ impl ScatteringShape {
     /// Ray of the texel (i, j, k) at an optical radius.
     pub fn coordinates(self, texel: [u32; 3], optical_radius: f64) -> RayCoordinates {
         let t = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
-        let full = 2.0 * optical_radius / MU_SCALE;
         RayCoordinates {
             theta: PI * t(texel[0], self.theta).powi(2),
             psi: PI * t(texel[1], self.psi),
-            mu: if texel[2] + 1 == self.mu { 1.0 } else { (t(texel[2], self.mu) * full.asinh()).sinh() / full },
+            mu: axis_to_mu(t(texel[2], self.mu), optical_radius),
         }
     }
 
     /// Real texel position of a ray; inverse of [`Self::coordinates`].
     pub fn texel(self, c: &RayCoordinates, optical_radius: f64) -> [f64; 3] {
-        let full = 2.0 * optical_radius / MU_SCALE;
-        let t = [(c.theta / PI).sqrt(), c.psi / PI, (full * c.mu).asinh() / full.asinh()];
+        let t = [(c.theta / PI).sqrt(), c.psi / PI, mu_to_axis(c.mu, optical_radius)];
         [t[0] * f64::from(self.theta - 1), t[1] * f64::from(self.psi - 1), t[2] * f64::from(self.mu - 1)]
     }
 }

@@ -75,6 +75,12 @@ pub fn single_scattering_model(ray: &LitRay, optical_radius: f64) -> f64 {
     sum / opacity(tau)
 }
 
+/// The bend of multiple scattering at the terminator [1/sr]. GLSL twin: `multiple_scattering_model`.
+pub fn multiple_scattering_model(ray: &LitRay, optical_radius: f64) -> f64 {
+    let (cos_sun, width) = (ray.entry.dot(ray.to_sun), 2.0 / optical_radius);
+    0.225 * optical_radius / (optical_radius + 15.0) * (cos_sun + cos_sun.hypot(width))
+}
+
 /// Fraction of the beam that leaves after exactly one event: Eq. 9 times the phase function over all rays.
 pub fn single_fraction(medium: &Medium, optical_radius: f64) -> f64 {
     let (x, w) = gauss_legendre(16);
@@ -135,19 +141,20 @@ impl ScatteringLookup {
         let lower = level.floor().min(f64::from(LEVELS - 2));
         let texel = self.shape.texel(c, r);
         let (a, b) = (self.level(texel, lower as usize), self.level(texel, lower as usize + 1));
-        let below = (optical_radius / R_MIN).min(1.0);
-        [0, 1].map(|i| below * (a[i] + (level - lower) * (b[i] - a[i])))
+        [0, 1].map(|i| a[i] + (level - lower) * (b[i] - a[i]))
     }
 
     /// Single scattering without phase function and albedo [1].
     pub fn single(&self, c: &RayCoordinates, optical_radius: f64) -> f64 {
-        let source = single_scattering_model(&c.ray(), optical_radius) + self.fetch(c, optical_radius)[0];
-        source.max(0.0) * opacity(2.0 * optical_radius * c.mu)
+        let rest = self.fetch(c, optical_radius)[0] * (optical_radius / R_MIN).min(1.0);
+        (single_scattering_model(&c.ray(), optical_radius) + rest).max(0.0) * opacity(2.0 * optical_radius * c.mu)
     }
 
     /// Radiance of light scattered twice or more, for unit irradiance [1/sr].
     pub fn multiple(&self, c: &RayCoordinates, optical_radius: f64) -> f64 {
-        self.fetch(c, optical_radius)[1] * opacity(2.0 * optical_radius * c.mu)
+        let model = multiple_scattering_model(&c.ray(), optical_radius.clamp(R_MIN, R_MAX));
+        let source = (model + self.fetch(c, optical_radius)[1]) * (optical_radius / R_MIN).min(1.0);
+        source.max(0.0) * opacity(2.0 * optical_radius * c.mu)
     }
 }
 

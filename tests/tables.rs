@@ -1,0 +1,235 @@
+//! The particle tables on the device against quadrature, Monte Carlo and closed forms.
+
+use glam::DVec3;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use welkin::gpu::standalone::{Options, Standalone};
+use welkin::lut::axes::{LEVELS, OpticalDepthShape, ScatteringShape};
+use welkin::lut::{Detail, TableParams, Tables};
+use welkin::params::{Clouds, Style};
+use welkin::reference::monte_carlo::{multiple_scattering, next_uniform, parallel};
+use welkin::reference::optical_depth::mean_density;
+use welkin::reference::scattering::{ScatteringLookup, directly_transmitted, single_fraction, single_scattering};
+use welkin::reference::sphere::RayCoordinates;
+
+fn open() -> Standalone {
+    Standalone::new(Options { validation: true, ..Options::default() }).expect("a device with validation")
+}
+
+/// Full tables of the default medium, kept in cargo's directory for tests: their name changes with solver and shaders.
+struct Fixture {
+    scattering: ScatteringLookup,
+    reports: Vec<welkin::lut::LevelReport>,
+    params: TableParams,
+}
+
+fn params(detail: Detail, style: Style) -> TableParams {
+    TableParams { style, ..TableParams::new(&Clouds::default(), detail) }
+}
+
+fn fixture() -> &'static Fixture {
+    static FIXTURE: OnceLock<Fixture> = OnceLock::new();
+    FIXTURE.get_or_init(|| {
+        let mut device = open();
+        let params = params(Detail::Full, Style::Homogeneous);
+        let cache = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let tables =
+            Tables::load_or_build(device.frames(), &params, Some(cache), &mut |_| ControlFlow::Continue(())).unwrap();
+        let tables = tables.unwrap();
+        let values = tables.read_scattering(device.frames()).unwrap();
+        assert_eq!(device.messages().unwrap().all(), Vec::<String>::new());
+        let scattering = ScatteringLookup::new(tables.scattering.shape(), values);
+        Fixture { scattering, reports: tables.reports().to_vec(), params }
+    })
+}
+
+/// Directory that no other test uses, removed first.
+fn scratch(name: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("welkin-tables-{name}-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&path);
+    path
+}
+
+/// Rays as light meets them: sun directions uniform, entry points uniform over the disc.
+fn random_ray(state: &mut u64) -> RayCoordinates {
+    let mut u = || next_uniform(state);
+    RayCoordinates { theta: (1.0 - 2.0 * u()).acos(), psi: std::f64::consts::PI * u(), mu: u().sqrt().max(1e-4) }
+}
+
+/// Relative RMS error weighted by radiance, and bias: √(Σ(x - t)² / Σt²), Σ(x - t) / Σt.
+fn errors(pairs: &[(f64, f64)]) -> (f64, f64) {
+    let square: f64 = pairs.iter().map(|(x, t)| (x - t).powi(2)).sum();
+    let energy: f64 = pairs.iter().map(|(_, t)| t * t).sum();
+    let (difference, total) = pairs.iter().fold((0.0, 0.0), |s, (x, t)| (s.0 + x - t, s.1 + t));
+    ((square / energy).sqrt(), difference / total)
+}
+
+#[test]
+fn single_scattering_agrees_with_quadrature_at_texels_and_between() {
+    let fixture = fixture();
+    let shape = ScatteringShape::FULL;
+    let mut state = 17;
+    for half_level in 0..2 * LEVELS - 1 {
+        let r = ScatteringShape::optical_radius(0)
+            * (ScatteringShape::optical_radius(1) / ScatteringShape::optical_radius(0))
+                .powf(0.5 * f64::from(half_level));
+        let between: Vec<_> = (0..600)
+            .map(|_| {
+                let c = random_ray(&mut state);
+                (fixture.scattering.single(&c, r), single_scattering(&c.ray(), r))
+            })
+            .collect();
+        let (rms, bias) = errors(&between);
+        // What interpolation leaves over the closed-form model; largest at the edge of shadow of thick balls.
+        assert!(rms < 0.02 && bias.abs() < 0.005, "R = {r}: rms {rms}, bias {bias}");
+        if half_level % 2 == 0 {
+            let at_texels: Vec<_> = (0..600)
+                .map(|_| {
+                    let mut pick = |n: u32| (next_uniform(&mut state) * f64::from(n)) as u32;
+                    let texel = [pick(shape.theta), pick(shape.psi), 1 + pick(shape.mu - 1)];
+                    let c = shape.coordinates(texel, r);
+                    (fixture.scattering.single(&c, r), single_scattering(&c.ray(), r))
+                })
+                .collect();
+            let (rms, bias) = errors(&at_texels);
+            // f32 quadrature and f16 storage of the small rest.
+            assert!(rms < 0.002 && bias.abs() < 0.001, "texels, R = {r}: rms {rms}, bias {bias}");
+        }
+    }
+}
+
+#[test]
+fn multiple_scattering_agrees_with_monte_carlo_between_texels() {
+    let fixture = fixture();
+    let medium = fixture.params.medium;
+    for level in 0..LEVELS {
+        let r = ScatteringShape::optical_radius(level);
+        let walks = if level < 5 { 1500 } else { 250 };
+        let rays = parallel(500, |i| {
+            let mut state = 1000 * u64::from(level) + i as u64;
+            let c = random_ray(&mut state);
+            let truth = multiple_scattering(&medium, &c.ray(), r, None, walks, state);
+            (fixture.scattering.multiple(&c, r), truth)
+        });
+        let pairs: Vec<_> = rays.iter().map(|(x, t)| (*x, t.mean)).collect();
+        let (rms, bias) = errors(&pairs);
+        let energy: f64 = pairs.iter().map(|(_, t)| t * t).sum();
+        let total: f64 = pairs.iter().map(|(_, t)| t).sum();
+        let variance: f64 = rays.iter().map(|(_, t)| t.error * t.error).sum();
+        // Monte Carlo's own noise is known and is taken out.
+        let clean = (rms * rms - variance / energy).max(0.0).sqrt();
+        let noise = variance.sqrt() / total;
+        println!(
+            "R = {r:.2}: rms {:.2} % (noise out), bias {:.2} ± {:.2} %",
+            100.0 * clean,
+            100.0 * bias,
+            100.0 * noise
+        );
+        assert!(clean < 0.03 + 0.3 * (variance / energy).sqrt(), "R = {r}: rms {clean}");
+        assert!(bias.abs() < 0.01 + 3.0 * noise, "R = {r}: bias {bias} ± {noise}");
+    }
+}
+
+#[test]
+fn no_energy_is_lost_or_made() {
+    let fixture = fixture();
+    for report in &fixture.reports {
+        let r = report.optical_radius;
+        let single = single_fraction(&fixture.params.medium, r);
+        let total = directly_transmitted(r) + single + report.multiple;
+        println!("R = {r:.2}: total {total:.5} after {} applications", report.applications);
+        assert!((total - 1.0).abs() < 0.005, "R = {r}: {total}");
+    }
+}
+
+#[test]
+fn optical_depth_is_the_mean_density_of_each_style() {
+    let mut device = open();
+    let shape = OpticalDepthShape::COARSE;
+    for style in [Style::Homogeneous, Style::Pyroclastic, Style::Radial, Style::Threshold] {
+        let params = params(Detail::Coarse, style);
+        let table = welkin::lut::OpticalDepthTable::new(device.gpu(), shape).unwrap();
+        device.frames().run(|rec| table.record(rec, style, params.seed)).unwrap();
+        let values = welkin::lut::read_image(device.frames(), table.image()).unwrap();
+        let mut state = 3;
+        let mut square: f64 = 0.0;
+        for _ in 0..400 {
+            let mut pick = |n: u32| (next_uniform(&mut state) * f64::from(n)) as u32;
+            let (i, j, k, l) = (pick(shape.phi_s), pick(shape.theta), pick(shape.phi_v), pick(shape.theta - 1));
+            let (phi_s, phi_v) =
+                (OpticalDepthShape::azimuth(i, shape.phi_s), OpticalDepthShape::azimuth(k, shape.phi_v));
+            let ((st, ct), (sp, cp)) = (shape.theta_s(j).sin_cos(), phi_s.sin_cos());
+            let entry = DVec3::new(st * cp, ct, st * sp);
+            let (e_theta, e_phi) = (DVec3::new(ct * cp, -st, ct * sp), DVec3::new(-sp, 0.0, cp));
+            let (sv, cv) = shape.theta_v(l).sin_cos();
+            let dir = -cv * entry + sv * (phi_v.cos() * e_theta + phi_v.sin() * e_phi);
+            let [x, y, _] = shape.image_extent();
+            let value = values[((k * y + l * shape.theta + j) * x + i) as usize];
+            let truth = mean_density(entry, dir, style, params.seed, 256);
+            square += (f64::from(value[0]) - truth).powi(2) / 400.0;
+            assert!((0.0..=1.0).contains(&value[1]) && (0.0..=1.001).contains(&value[0]));
+        }
+        // The coarse table samples density on 48³ points, whose cell is 1/24 of the radius; edges blur over one cell.
+        assert!(square.sqrt() < 0.02, "{style:?}: rms {}", square.sqrt());
+    }
+    assert_eq!(device.messages().unwrap().all(), Vec::<String>::new());
+}
+
+#[test]
+fn tables_are_built_once_and_rebuilt_when_damaged() {
+    let mut device = open();
+    let directory = scratch("cache");
+    let params = params(Detail::Coarse, Style::Radial);
+    let mut load = |cache: &PathBuf| {
+        let mut calls = 0;
+        let progress = &mut |_| {
+            calls += 1;
+            ControlFlow::Continue(())
+        };
+        let tables = Tables::load_or_build(device.frames(), &params, Some(cache), progress).unwrap().unwrap();
+        let scattering = tables.read_scattering(device.frames()).unwrap();
+        (tables.built(), tables.warnings().len(), calls, scattering, tables.reports().to_vec())
+    };
+    assert!(!Tables::cached(&params, &directory));
+    let first = load(&directory);
+    assert!(first.0 && first.1 == 0 && first.2 > 0);
+    assert!(Tables::cached(&params, &directory));
+    let second = load(&directory);
+    assert!(!second.0 && second.1 == 0 && second.2 == 0, "built again");
+    assert_eq!((&first.3, &first.4), (&second.3, &second.4));
+    let file = directory.join(params.scattering_file());
+    let mut bytes = std::fs::read(&file).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    std::fs::write(&file, bytes).unwrap();
+    let third = load(&directory);
+    assert!(third.0 && third.1 == 1, "damage was not noticed");
+    assert_eq!(first.3, third.3, "the same parameters gave another table");
+    assert_eq!(load(&directory).1, 0);
+    assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 2);
+
+    // A cache that cannot be written is no error.
+    let blocked = directory.join("file");
+    std::fs::write(&blocked, b"").unwrap();
+    let unwritable = load(&blocked);
+    assert!(unwritable.0 && unwritable.1 >= 2);
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn a_build_that_is_stopped_leaves_the_cache_as_it_was() {
+    let mut device = open();
+    let directory = scratch("stopped");
+    let params = params(Detail::Coarse, Style::Homogeneous);
+    let mut calls = 0;
+    let tables = Tables::load_or_build(device.frames(), &params, Some(&directory), &mut |_| {
+        calls += 1;
+        if calls > 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(tables.unwrap().is_none());
+    assert!(!directory.join(params.scattering_file()).exists());
+    let left: Vec<_> = std::fs::read_dir(&directory).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(left, [std::ffi::OsString::from(params.optical_depth_file())]);
+    std::fs::remove_dir_all(directory).unwrap();
+}
