@@ -49,7 +49,7 @@ fn lists_are_the_same_however_they_are_ordered() {
         let mut device = open();
         let mut stages = Stages::new(&device, &setup);
         let mut results = orders(&device).into_iter().map(|order| {
-            stages.tiling = tiling(&device, &setup, 1 << 20, order);
+            stages.tiling = tiling(&device, &setup, 1 << 22, order);
             device.frames().state().forget();
             let counters = stages.run(&mut device, &setup);
             let heads: Vec<u32> = read(&mut device, stages.tiling.heads(), setup.tiling_params().tile_count());
