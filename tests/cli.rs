@@ -222,6 +222,47 @@ fn a_full_disk_is_an_error_and_leaves_nothing() {
 }
 
 #[test]
+fn a_damaged_cache_is_told_of_and_mended() {
+    let bench = Bench::new(&BALL.replace("lighting = \"flat\"", "lighting = \"tables\""));
+    let cache = bench.path("cache");
+    let render = || bench.render(&["--tables", "reduced", "--cache", &cache]);
+    let picture = |output: &Output| {
+        assert!(output.status.success(), "{}", stderr(output));
+        fs::read(bench.path("out.png")).unwrap()
+    };
+    let first = render();
+    let expected = picture(&first);
+    assert!(!stderr(&first).contains("warning"), "{}", stderr(&first));
+    let files: Vec<_> = fs::read_dir(&cache).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(files.len(), 2, "two tables and no part of one: {files:?}");
+
+    // A changed byte, a lost end, nothing at all: of the table that is quick to make again.
+    let table = files.iter().find(|path| path.to_string_lossy().contains("optical-depth")).unwrap();
+    let whole = fs::read(table).unwrap();
+    let mut changed = whole.clone();
+    changed[whole.len() / 2] ^= 1;
+    for damaged in [&changed, &whole[..whole.len() - 1], &[]] {
+        fs::write(table, damaged).unwrap();
+        let output = render();
+        assert!(picture(&output) == expected, "the picture changed");
+        let message = stderr(&output);
+        assert!(message.contains("warning") && message.contains("built anew"), "{message}");
+        assert!(message.contains(table.file_name().unwrap().to_str().unwrap()), "{message}");
+        assert!(fs::read(table).unwrap() == whole, "the table was not mended");
+    }
+    let last = render();
+    assert!(picture(&last) == expected && !stderr(&last).contains("warning"), "{}", stderr(&last));
+}
+
+#[test]
+fn a_cache_that_is_no_directory_is_refused() {
+    let bench = Bench::new(&BALL.replace("lighting = \"flat\"", "lighting = \"tables\""));
+    fs::write(bench.path("cache"), "").unwrap();
+    let output = bench.render(&["--cache", &bench.path("cache")]);
+    bench.assert_refused(&output, &["--cache", "expected a directory"], &["cache"]);
+}
+
+#[test]
 fn an_unknown_command_is_an_error() {
     for arguments in [&["paint"][..], &["render"], &[]] {
         let output = welkin().args(arguments).output().unwrap();

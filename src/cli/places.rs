@@ -53,8 +53,12 @@ pub fn in_directory(file: &Path) -> Result<()> {
 }
 
 /// The directory for tables: what was asked for, `$WELKIN_CACHE`, or `welkin` in the user's cache directory.
-pub fn cache(asked: Option<&Path>) -> PathBuf {
-    cache_from(asked, |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from))
+pub fn cache(asked: Option<&Path>) -> Result<PathBuf> {
+    let cache = cache_from(asked, |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from));
+    if cache.exists() && !cache.is_dir() {
+        return Err(Error::invalid("--cache", cache.display(), "a directory for tables, made if need be"));
+    }
+    Ok(cache)
 }
 
 fn cache_from(asked: Option<&Path>, variable: impl Fn(&str) -> Option<PathBuf>) -> PathBuf {

@@ -39,7 +39,7 @@ pub fn run(args: &PrecomputeArgs) -> Result<()> {
     let frames = device.frames();
     let detail = if args.reduced { Detail::Coarse } else { Detail::Full };
     let wanted = TableParams::new(&params.clouds, detail);
-    let made = tables::make(frames, &wanted, &places::cache(args.args.cache.as_deref()))?;
+    let made = tables::make(frames, &wanted, &places::cache(args.args.cache.as_deref())?)?;
     let files = [
         optical_depth(made.optical_depth.shape(), &made.read_optical_depth(frames)?),
         scattering(made.scattering.shape(), &made.read_scattering(frames)?),

@@ -90,7 +90,7 @@ impl Session {
         let tables = match params.clouds.lighting {
             Lighting::Flat if params.clouds.style == Style::Homogeneous => None,
             _ => {
-                let cache = places::cache(args.scene.cache.as_deref());
+                let cache = places::cache(args.scene.cache.as_deref())?;
                 Some(tables::obtain(frames, params, args.tables, &cache)?)
             }
         };
