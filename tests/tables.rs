@@ -105,7 +105,7 @@ fn multiple_scattering_agrees_with_monte_carlo_between_texels() {
     let medium = fixture.params.medium;
     for level in 0..LEVELS {
         let r = ScatteringShape::optical_radius(level);
-        let walks = if level < 5 { 1500 } else { 250 };
+        let walks = if level < 5 { 4000 } else { 500 };
         let rays = parallel(500, |i| {
             let mut state = 1000 * u64::from(level) + i as u64;
             let c = random_ray(&mut state);

@@ -2,11 +2,13 @@
 
 pub mod axes;
 mod cache;
+mod export;
 mod optical_depth;
 mod scattering;
 mod tables;
 pub mod transport;
 
+pub use export::{EnergyBalance, ExportAxis, ExportTable};
 pub use optical_depth::{OpticalDepthTable, style_index};
 pub use scattering::{LevelReport, ScatteringTable};
 pub use tables::{Detail, Progress, TableParams, Tables, read_image};

@@ -12,6 +12,8 @@ use crate::{Error, Result};
 pub struct Axis {
     /// What the axis is, for example `cos_theta`.
     pub name: String,
+    /// What that means, in a sentence.
+    pub meaning: String,
     /// Unit of the values; `1` for a pure number.
     pub unit: String,
     /// The value at each index.
@@ -81,7 +83,7 @@ impl Table {
 }
 
 /// Writes each table as `NAME.npy` into `directory`, which is created if need be, then `tables.json`:
-/// `{parameters, tables: [{name, file, quantity, unit, shape, axes: [{name, unit, values}], components}]}`.
+/// `{parameters, tables: [{name, file, quantity, unit, shape, axes: [{name, meaning, unit, values}], components}]}`.
 ///
 /// # Errors
 /// [`Error::File`] when a value is not finite or a file cannot be written.
@@ -117,7 +119,7 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        let axis = |name: &str, values| Axis { name: name.into(), unit: "1".into(), values };
+        let axis = |name: &str, values| Axis { name: name.into(), meaning: "m".into(), unit: "1".into(), values };
         let per_u = AxisValues::Per { per: "u".into(), values: vec![vec![0.0, 0.5, 1.0], vec![0.0, 0.1, 1.0]] };
         Table {
             name: "depth".into(),

@@ -97,13 +97,29 @@ pub fn multiple_scattering(
             if orders.is_some_and(|n| order > n) {
                 break;
             }
-            let cos = medium.phase.sample(medium.g, || next_uniform(&mut state));
-            dir = turn(dir, cos, 2.0 * PI * next_uniform(&mut state));
-            let free = -(1.0 - next_uniform(&mut state)).ln() / optical_radius;
-            if free >= distance_to_surface(point, dir) {
-                break;
+            if order == 2 {
+                // From the first vertex half of the walks turn by the phase function and half towards where the sun's
+                // event is likely, and all of them have an event: thin balls would be noise otherwise.
+                let towards_sun = next_uniform(&mut state) < 0.5;
+                let g = if towards_sun { medium.g_sun } else { medium.g };
+                let cos = medium.phase.sample(g, || next_uniform(&mut state));
+                let axis = if towards_sun { ray.to_sun } else { dir };
+                let turned = turn(axis, cos, 2.0 * PI * next_uniform(&mut state));
+                let wanted = medium.phase.eval(dir.dot(turned), medium.g);
+                weight *= wanted / (0.5 * wanted + 0.5 * medium.phase.eval(ray.to_sun.dot(turned), medium.g_sun));
+                dir = turned;
+                let opacity = -(-optical_radius * distance_to_surface(point, dir)).exp_m1();
+                weight *= opacity;
+                point -= dir * (-next_uniform(&mut state) * opacity).ln_1p() / optical_radius;
+            } else {
+                let cos = medium.phase.sample(medium.g, || next_uniform(&mut state));
+                dir = turn(dir, cos, 2.0 * PI * next_uniform(&mut state));
+                let free = -(1.0 - next_uniform(&mut state)).ln() / optical_radius;
+                if free >= distance_to_surface(point, dir) {
+                    break;
+                }
+                point += dir * free;
             }
-            point += dir * free;
             weight *= medium.albedo;
             let to_sun = distance_to_surface(point, ray.to_sun);
             radiance +=
