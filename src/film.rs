@@ -17,7 +17,7 @@ pub const REFERENCE_RADIANCE: f32 = 0.36;
 /// Irradiance on a surface that faces the sun 45° high, 1000 m above the sea in the default air [W m⁻² nm⁻¹]: the light
 /// that shows white, as on a daylight film. Clouds are then neither yellow nor blue, and the evening stays warm.
 /// (A test of [`crate::reference::atmosphere`] compares it with the air.)
-pub const DAYLIGHT: [f32; 3] = [1.37, 1.55, 1.37];
+pub const DAYLIGHT: [f32; 3] = [1.35, 1.53, 1.35];
 
 /// Factors from radiance to the tone curve's input. Without a sky all three channels are treated alike.
 #[must_use]

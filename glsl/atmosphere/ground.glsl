@@ -84,19 +84,20 @@ vec3 field_at(vec2 p) {
 // planet is about `mean_albedo`. Relative colours of crop, meadow, fallow and wood are tuned on photographs from the air.
 vec3 ground_albedo(vec3 mean_albedo, vec2 p, float footprint) {
     const vec3 wood = vec3(0.42, 0.52, 0.48);
-    const vec3 field_mean = vec3(1.19, 1.16, 1.17);
+    const vec3 field_mean = vec3(1.19, 1.14, 1.10);
     float land = ground_fbm(p, 16384.0, 5, footprint, 11u); // where woods are
     vec3 relative = field_mean;
     float keep = resolved(0.7 * FIELD_SIZE, footprint);
     if (keep > 0.0) {
         vec2 warp = vec2(ground_noise(p, 2048.0, 5u), ground_noise(p, 2048.0, 6u)) * 500.0; // lanes wind a little
         vec3 field = field_at(mod(p + warp, GROUND_PERIOD));
-        vec3 crop = mix(vec3(0.80, 1.02, 0.75), vec3(1.05, 1.30, 0.95), field.x);      // green crop and meadow
+        vec3 crop = mix(vec3(0.82, 0.92, 0.78), vec3(1.18, 1.22, 1.02), field.x);      // green crop and meadow
         vec3 straw = mix(vec3(1.75, 1.45, 1.50), vec3(1.35, 1.08, 1.35), field.x);     // ripe grain and bare soil
         vec3 colour = mix(crop, straw, smoothstep(0.55, 0.75, field.y));
-        float hedge = (1.0 - smoothstep(4.0, 14.0, field.z)) * resolved(24.0, footprint);
-        colour = mix(colour, wood, 0.75 * hedge);
-        colour *= 0.9 + 0.2 * ground_fbm(p, 64.0, 3, footprint, 31u);
+        colour *= 0.4 + 1.2 * ground_fbm(p, 256.0, 9, footprint, 31u); // unevenness down to tufts
+        float ragged = 8.0 * ground_fbm(p, 32.0, 4, footprint, 51u);
+        float hedge = (1.0 - smoothstep(2.0, 9.0, field.z - ragged + 4.0)) * resolved(24.0, footprint);
+        colour = mix(colour, wood * (0.6 + 0.8 * ground_fbm(p, 16.0, 4, footprint, 61u)), 0.85 * hedge);
         relative = mix(relative, colour, keep);
     }
     float wooded = smoothstep(0.53, 0.53 + mix(0.015, 0.10, smoothstep(20.0, 2000.0, footprint)), land);
@@ -105,9 +106,14 @@ vec3 ground_albedo(vec3 mean_albedo, vec2 p, float footprint) {
     return mean_albedo * relative * (0.85 + 0.3 * ground_fbm(p, 32768.0, 3, footprint, 21u));
 }
 
+// Part of the sunlight on a cumulus that leaves its base again, diffusely: two-stream, 1/(1 + 3/4 τ(1 − g)) for τ = 30,
+// g = 0.85. Without it the ground in the shadow of a cloud would be lit by clear sky alone, too dark and too blue.
+const float CLOUD_DIFFUSE_TRANSMITTANCE = 0.23;
+
 // Radiance of diffuse ground under sun and sky [irradiance/sr].
 vec3 ground_radiance(vec3 albedo, vec3 sun_irradiance, float mu_s, float cloud_shadow, vec3 sky_irradiance) {
-    return albedo / AIR_PI * (sun_irradiance * (max(mu_s, 0.0) * cloud_shadow) + sky_irradiance);
+    float sun_part = mix(CLOUD_DIFFUSE_TRANSMITTANCE, 1.0, cloud_shadow);
+    return albedo / AIR_PI * (sun_irradiance * (max(mu_s, 0.0) * sun_part) + sky_irradiance);
 }
 
 #endif

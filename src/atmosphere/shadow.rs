@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Half the side of the shadow map's square around the camera \[m\].
 pub const SHADOW_EXTENT: f32 = 80e3;
 
-const SIZE: u32 = 512;
+const SIZE: u32 = 384;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -166,7 +166,7 @@ fn airlight_converges_and_does_not_create_energy() {
         let sky = t.horizontal_irradiance(0.0, mu_s, true, DVec3::ZERO);
         let total = sky + t.to_sun(0.0, mu_s) * mu_s;
         assert!(total.max_element() < mu_s * 1.03, "sun at {mu_s}: {total}");
-        assert!(total.min_element() > mu_s * 0.6, "sun at {mu_s}: {total}");
+        assert!(total.min_element() > mu_s * 0.55, "sun at {mu_s}: {total}");
     }
 }
 
@@ -181,7 +181,7 @@ fn the_sky_is_blue_overhead_pale_at_the_horizon_and_red_at_sunset() {
     let high = 50f64.to_radians().sin();
     let (zenith, horizon) = (look(1.0, high, PI), look(0.02, high, PI));
     assert!(zenith.z > 2.5 * zenith.x, "zenith {zenith}");
-    assert!(horizon.z < 2.0 * horizon.x && horizon.y > 3.0 * zenith.y, "horizon {horizon}");
+    assert!(horizon.z / horizon.x < 0.6 * zenith.z / zenith.x && horizon.y > 3.0 * zenith.y, "horizon {horizon}");
     let sunset = look(0.02, 1f64.to_radians().sin(), 0.1);
     assert!(sunset.x > 2.0 * sunset.z, "sunset {sunset}");
     let sun = t.to_sun(2.0, 2f64.to_radians().sin());
