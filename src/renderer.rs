@@ -206,8 +206,7 @@ impl Renderer {
             Particles::Grid(grid, _) => Some(&**grid),
             Particles::List(_) => None,
         };
-        // The sun's irradiance above the clouds is multiplied in by the shading: here it is a transmittance.
-        rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid, [1.0; 3]))?;
+        rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid))?;
         let (frame_buffer, model) = (&self.frame[slot], self.params.sky.model);
         self.atmosphere.record_luts(rec, frame_buffer, self.params.clouds.altitude)?;
         if model == SkyModel::Atmosphere {

@@ -45,7 +45,7 @@ assert_layout!(Particle, particle, {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ParticleLight {
-    /// Sun irradiance [W m⁻²].
+    /// Share of the sunlight that reaches the pole facing the sun, the centre and the far pole, 0 to 1.
     pub sun: [f32; 3],
     /// Visibility of the sky, 0 to 1.
     pub ambient: f32,

@@ -7,7 +7,7 @@ use clouds::{Setup, Stages, open, read, silent};
 use glam::DVec3;
 use welkin::params::Coverage;
 use welkin::reference::grid;
-use welkin::reference::lighting::{chord_ahead, smooth, sun_optical_depth};
+use welkin::reference::lighting::{chord_ahead, reach, smooth, sun_optical_depth};
 use welkin::shared::{Particle, ParticleLight};
 
 fn to_sun(elevation: f64) -> [f64; 3] {
@@ -27,18 +27,22 @@ fn no_occluder_is_missed_whatever_the_suns_height() {
         let counters = stages.run(&mut device, &setup);
         assert_eq!(counters.truncated, 0);
         let particles: Vec<Particle> = read(&mut device, stages.set.particles(), counters.stored);
-        let device_values: Vec<f32> = read(&mut device, stages.lighting.transmittance(), counters.stored);
+        let device_values: Vec<[f32; 4]> = read(&mut device, stages.lighting.transmittance(), counters.stored);
         let t = setup.tiling_params();
         let (mut least, mut greatest) = (1.0f64, 0.0f64);
         for index in (0..particles.len()).step_by(particles.len() / 400) {
             let start = DVec3::from_array(particles[index].centre.map(f64::from));
             let sun = DVec3::from_array(setup.to_sun);
-            let tau = sun_optical_depth(&particles, start, sun, t.occlusion.into(), Some(index));
-            let expected = (-tau).exp();
-            // f32 positions relative to a particle are good to 4 mm of some 100 m; the direction to 1e-7 of up to 8e4 m.
-            let got = f64::from(device_values[index]);
-            assert!((got - expected).abs() < 1e-3, "{elevation}°, particle {index}: {got}, expected {expected}");
-            (least, greatest) = (least.min(expected), greatest.max(expected));
+            let pole = reach(&particles[index], sun) * sun;
+            for (point, got) in [start + pole, start, start - pole].into_iter().zip(device_values[index]) {
+                let tau = sun_optical_depth(&particles, point, sun, t.occlusion.into(), Some(index));
+                let expected = (-tau).exp();
+                // f32 positions relative to a particle are good to 4 mm of some 100 m; the direction to 1e-7 of up to
+                // 8e4 m.
+                let got = f64::from(got);
+                assert!((got - expected).abs() < 1e-3, "{elevation}°, particle {index}: {got}, expected {expected}");
+                (least, greatest) = (least.min(expected), greatest.max(expected));
+            }
         }
         assert!(
             least < 0.5 && greatest > 0.9,
@@ -54,17 +58,18 @@ fn smoothing_and_skylight_are_those_of_the_reference() {
     let mut device = open();
     let stages = Stages::new(&device, &setup);
     let counters = stages.run(&mut device, &setup);
-    let transmittance: Vec<f32> = read(&mut device, stages.lighting.transmittance(), counters.stored);
-    let transmittance: Vec<f64> = transmittance.into_iter().map(f64::from).collect();
+    let transmittance: Vec<[f32; 4]> = read(&mut device, stages.lighting.transmittance(), counters.stored);
+    let [pole, _, far] = [0, 1, 2].map(|i| transmittance.iter().map(|t| f64::from(t[i])).collect::<Vec<_>>());
     let lights: Vec<ParticleLight> = read(&mut device, stages.set.lights(), counters.stored);
     let params = setup.grid_params();
     let grid = grid::generate(&params, &[]);
     for (index, light) in lights.iter().enumerate() {
         let smoothing = f64::from(welkin::lighting::SMOOTHING);
-        let (sun, sky) = smooth(&grid, &params, &transmittance, smoothing, index);
+        let (sun, sky) = smooth(&grid, &params, &pole, smoothing, index);
+        let (shade, _) = smooth(&grid, &params, &far, smoothing, index);
         // Sums of ten f32, one exponential each.
         assert!((f64::from(light.sun[0]) - sun).abs() < 1e-5, "{index}: {light:?} {sun}");
-        assert!((f64::from(light.sun[2]) - 0.25 * sun).abs() < 1e-5);
+        assert!((f64::from(light.sun[2]) - shade).abs() < 1e-5);
         assert!((f64::from(light.ambient) - sky).abs() < 1e-5, "{index}: {light:?} {sky}");
     }
     silent(&device);

@@ -97,7 +97,7 @@ fn a_thousand_frames_of_a_moving_camera_leak_nothing() {
     let mut device = open(false);
     let tables = Tables::new(&mut device);
     let mut params = params();
-    (params.quality.cells, params.quality.rings) = (40, 2);
+    (params.quality.cells, params.quality.rings) = (24, 1);
     let gpu = device.gpu().clone();
     let before = gpu.memory_use();
     {

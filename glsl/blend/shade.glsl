@@ -40,7 +40,10 @@ vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sample
     float single = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_single).x;
     float multiple = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_multiple).y;
     float p_sun = phase(dot(frame.to_sun, dir), medium.g_single, medium.phase_function);
-    vec3 sunlight = sky.sun_irradiance_clouds * light.sun * (medium.albedo * p_sun * single + multiple);
+    // Light fades along the sun's axis, from the pole that faces it to the far one.
+    float along = dot(entry_us, to_sun_us);
+    float reaches = along > 0.0 ? mix(light.sun.y, light.sun.x, along) : mix(light.sun.y, light.sun.z, -along);
+    vec3 sunlight = sky.sun_irradiance_clouds * reaches * (medium.albedo * p_sun * single + multiple);
 
     // Sky and ground as two half-spheres of constant radiance E / π, seen by the surface; creases, which lie deep below the
     // ellipsoid, are brighter than edges (Yusov 4.4).

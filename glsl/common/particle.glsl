@@ -13,7 +13,7 @@ struct Particle {
 };
 
 struct ParticleLight {
-    vec3  sun;        // sun irradiance that reaches the particle [W m⁻²]
+    vec3  sun;        // share of the sunlight that reaches the pole facing the sun, the centre and the far pole [0, 1]
     float ambient;    // visibility of the sky [0, 1]
 };
 

@@ -17,17 +17,16 @@ layout(set = 0, binding = 2, std430) readonly restrict buffer Particles { Partic
 layout(set = 0, binding = 3, std430) readonly restrict buffer ParticleCells { uint cell_and_layer[]; } particle_cells;
 layout(set = 0, binding = 4, std430) readonly restrict buffer CellShapes { vec4 shape[]; } cell_shapes;
 layout(set = 0, binding = 5, std430) readonly restrict buffer CellFirst { uint first[]; } cell_first;
-layout(set = 0, binding = 6, std430) readonly restrict buffer SunTransmittance { float transmittance[]; } sun;
+layout(set = 0, binding = 6, std430) readonly restrict buffer SunTransmittance { vec4 transmittance[]; } sun;
 layout(set = 0, binding = 7, std430) writeonly restrict buffer ParticleLights { ParticleLight light[]; } particle_lights;
 layout(push_constant) uniform SmoothPush {
-    vec3 sun_irradiance; // at the top of the clouds [W/m²]
     float smoothing;     // weight of a neighbour against 1 of the particle itself; 0: none
 } push;
 
-void add(uint slot, float share, inout float weighted, inout float weights) {
+void add(uint slot, float share, inout vec3 weighted, inout float weights) {
     if (slot >= counters.count.stored) return;
     float weight = share * particles.particle[slot].density * particles.particle[slot].fade;
-    weighted += weight * sun.transmittance[slot];
+    weighted += weight * sun.transmittance[slot].xyz;
     weights += weight;
 }
 
@@ -35,7 +34,7 @@ void main() {
     uint index = linear_index();
     if (index >= counters.count.stored) return;
     uint packed_cell = particle_cells.cell_and_layer[index];
-    float transmittance = sun.transmittance[index];
+    vec3 transmittance = sun.transmittance[index].xyz;
     float sky = 1.0;
     if (packed_cell != NO_CELL) {
         uint cell = packed_cell >> 5u, layer = packed_cell & 31u;
@@ -44,7 +43,8 @@ void main() {
         CellShape shape = unpack_shape(cell_shapes.shape[cell]);
         Particle particle = particles.particle[index];
         float height = particle.centre.y - base_height(particle.centre.xz - params.grid.camera.xz, params.grid);
-        float weighted = 0.0, weights = 0.0, open = 0.0;
+        vec3 weighted = vec3(0.0);
+        float weights = 0.0, open = 0.0;
         add(index, 1.0, weighted, weights);
         bool puff = layer >= shape.layers;
         if (puff) {
@@ -72,5 +72,5 @@ void main() {
         transmittance = weights > 0.0 ? weighted / weights : transmittance;
         sky = sky_visibility(open / 9.0);
     }
-    particle_lights.light[index] = ParticleLight(push.sun_irradiance * transmittance, sky);
+    particle_lights.light[index] = ParticleLight(transmittance, sky);
 }

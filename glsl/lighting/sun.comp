@@ -1,4 +1,6 @@
-// Sunlight that reaches the centre of every particle, as transmittance. One thread a particle. Yusov 5.3, step 2.
+// Sunlight that reaches every particle, as transmittance at three points on the ray through its centre: the pole that
+// faces the sun, the centre, the far pole. One walk of the list serves all three. One thread a particle. Yusov 5.3, step
+// 2, which knows the centre alone; with three, overlapping particles agree on the light between them.
 // Particles outside the view are lit too: smoothing reads them, and light must not change when the camera turns.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -12,15 +14,17 @@ layout(set = 0, binding = 1, std430) readonly restrict buffer Particles { Partic
 layout(set = 0, binding = 2, std430) readonly restrict buffer TileHeads { uint head[]; } tile_heads;
 layout(set = 0, binding = 3, std430) readonly restrict buffer TileNodes { TileNode node[]; } tile_nodes;
 layout(set = 0, binding = 4, std430) restrict buffer CountersBuffer { Counters count; } counters;
-layout(set = 0, binding = 5, std430) writeonly restrict buffer SunTransmittance { float transmittance[]; } sun;
+layout(set = 0, binding = 5, std430) writeonly restrict buffer SunTransmittance { vec4 transmittance[]; } sun;
 #include "lighting/sun_optical_depth.glsl"
 
 void main() {
     uint index = linear_index();
     if (index >= counters.count.stored) return;
     uint visited;
-    float optical_depth = sun_optical_depth_of(particles.particle[index].centre, index, visited);
+    Particle particle = particles.particle[index];
+    float reach = 1.0 / length(to_unit_ball(particle, vec4(params.tiling.to_sun, 0.0)));
+    vec3 optical_depths = sun_optical_depths(particle.centre, reach, index, visited);
     atomicMax(counters.count.longest_walk, visited);
     if (visited > params.tiling.traversal_limit) atomicAdd(counters.count.truncated, 1u);
-    sun.transmittance[index] = exp(-optical_depth);
+    sun.transmittance[index] = vec4(exp(-optical_depths), 0.0);
 }

@@ -9,8 +9,9 @@
 #define WELKIN_LIGHTING_SUN_OPTICAL_DEPTH
 #include "tiling/tile.glsl"
 
-// Length of the ray's way through the ellipsoid in front of its start [m].
-float chord_ahead(Particle p, vec3 start, vec3 direction) {
+// Lengths of the ray's way through the ellipsoid in front of three points on it: `reach` ahead of its start, the start,
+// and `reach` behind it [m].
+vec3 chords_ahead(Particle p, vec3 start, vec3 direction, float reach) {
     vec3 o_us = to_unit_ball(p, vec4(start, 1.0));
     vec3 d_us = to_unit_ball(p, vec4(direction, 0.0));
     // |o + t d|² = 1. The nearest point to the centre is found first: its distance does not cancel.
@@ -18,9 +19,10 @@ float chord_ahead(Particle p, vec3 start, vec3 direction) {
     float t_nearest = -dot(o_us, d_us) / dd;
     vec3 nearest = o_us + t_nearest * d_us;
     float inside = 1.0 - dot(nearest, nearest);
-    if (inside <= 0.0) return 0.0;
+    if (inside <= 0.0) return vec3(0.0);
     float half_chord = sqrt(inside / dd);
-    return max(t_nearest + half_chord, 0.0) - max(t_nearest - half_chord, 0.0);
+    vec3 from = vec3(reach, 0.0, -reach);
+    return max(t_nearest + half_chord - from, 0.0) - max(t_nearest - half_chord - from, 0.0);
 }
 
 // Moves a point below the clouds along the light up to the base of the slab: nothing lies between, and the lists hold
@@ -35,23 +37,24 @@ vec3 lift_to_slab(vec3 p_ws, in TilingParams t) {
     return p_ws;
 }
 
+// At three points on the ray through `p_ws` towards the sun: `reach` ahead of it, there, and `reach` behind.
 // `self`: a particle that does not occlude (NO_NODE: none). `visited`: nodes looked at; beyond the limit, the rest of the
 // list was left out.
-float sun_optical_depth_of(vec3 p_ws, uint self, out uint visited) {
+vec3 sun_optical_depths(vec3 p_ws, float reach, uint self, out uint visited) {
     visited = 0u;
     vec3 start = lift_to_slab(p_ws, params.tiling);
     uint tile = receiver_tile(start, params.tiling);
-    if (tile == NO_NODE) return 0.0;
+    if (tile == NO_NODE) return vec3(0.0);
     float depth = light_depth(start, params.tiling);
-    float sum = 0.0;
+    vec3 sum = vec3(0.0);
     uint node = tile_heads.head[tile];
     while (node != NO_NODE && ++visited <= params.tiling.traversal_limit) {
         TileNode entry = tile_nodes.node[node];
         // Front to back: from here on everything lies behind the receiver.
-        if (key_depth(entry.key) < depth - params.tiling.greatest_extent) break;
+        if (key_depth(entry.key) < depth - reach - params.tiling.greatest_extent) break;
         if (entry.particle != self) {
             Particle p = particles.particle[entry.particle];
-            sum += p.density * p.fade * chord_ahead(p, start, params.tiling.to_sun);
+            sum += p.density * p.fade * chords_ahead(p, start, params.tiling.to_sun, reach);
         }
         node = entry.next;
     }
@@ -61,7 +64,7 @@ float sun_optical_depth_of(vec3 p_ws, uint self, out uint visited) {
 // For any point at all: on the ground, in the air, on a cloud.
 float sun_optical_depth(vec3 p_ws) {
     uint visited;
-    return sun_optical_depth_of(p_ws, NO_NODE, visited);
+    return sun_optical_depths(p_ws, 0.0, NO_NODE, visited).y;
 }
 
 #endif

@@ -29,6 +29,9 @@ bool shades_level(Particle p, uint level, in TilingParams t) {
     vec2 shadow = horizontal > 1e-6 ? t.to_sun.xz * (t.reach / horizontal) : vec2(0.0);
     vec2 b = a.xz - shadow;
     float radius = max(p.semi_axes.x, max(p.semi_axes.y, p.semi_axes.z)) + 1.0;
+    // A receiver is lit at its far pole too: its centre may lie on the light's side of the occluder by as much as it
+    // reaches. What is largest halves from level to level inwards.
+    radius += t.greatest_extent * exp2(float(level) + 1.0 - float(t.level_count));
     // The Chebyshev norm is convex: greatest at an end of the segment. Its least is bounded by each axis alone.
     float greatest = max(max(abs(a.x), abs(a.z)), max(abs(b.x), abs(b.y))) + radius;
     float least_x = a.x * b.x <= 0.0 ? 0.0 : min(abs(a.x), abs(b.x));

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! let lighting = Lighting::new(&gpu, set.capacity())?;
-//! rec.pass("lighting", |rec| lighting.record(rec, &tiling, &set, Some(&grid), sun_irradiance))?;
+//! rec.pass("lighting", |rec| lighting.record(rec, &tiling, &set, Some(&grid)))?;
 //! ```
 //!
 //! Other shaders get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
@@ -23,7 +23,6 @@ pub const SMOOTHING: f32 = 0.7;
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct SmoothPush {
-    sun_irradiance: [f32; 3],
     smoothing: f32,
 }
 
@@ -49,13 +48,13 @@ impl Lighting {
         Ok(Self {
             sun: ComputePipeline::new(gpu, &sun::PROGRAM, &[])?,
             smooth: ComputePipeline::new(gpu, &smooth::PROGRAM, &[])?,
-            transmittance: Buffer::array::<f32>(gpu, "sun transmittance", capacity as usize)?,
+            transmittance: Buffer::array::<[f32; 4]>(gpu, "sun transmittance", capacity as usize)?,
             no_grid,
             capacity,
         })
     }
 
-    /// Sun transmittance of every particle before smoothing.
+    /// Sun transmittance of every particle before smoothing: at the pole facing the sun, the centre, the far pole, and 0.
     #[must_use]
     pub fn transmittance(&self) -> &Buffer {
         &self.transmittance
@@ -71,14 +70,13 @@ impl Lighting {
     }
 
     /// Records occlusion and smoothing. `grid` is none for explicit particles, which are not smoothed and see the whole
-    /// sky; `sun_irradiance` is that above the clouds.
+    /// sky.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
         tiling: &Tiling,
         set: &ParticleSet,
         grid: Option<&Grid>,
-        sun_irradiance: [f32; 3],
     ) -> Result<()> {
         assert!(set.capacity() <= self.capacity, "the particle set has grown: call grow() too");
         let slot = rec.slot();
@@ -109,7 +107,7 @@ impl Lighting {
                 sun: &self.transmittance,
                 particle_lights: set.lights(),
             },
-            &SmoothPush { sun_irradiance, smoothing: SMOOTHING },
+            &SmoothPush { smoothing: SMOOTHING },
             set.args(),
             ParticleSet::PARTICLE_ARGS,
         )

@@ -44,6 +44,13 @@ fn sky_openness(above: f64) -> f64 {
     (-above.max(0.0) / 450.0).exp()
 }
 
+/// Distance from the centre to the pole that faces the sun [m].
+#[must_use]
+pub fn reach(particle: &Particle, to_sun: DVec3) -> f64 {
+    let local = DQuat::from_array(particle.rotation.map(f64::from)).inverse() * to_sun;
+    1.0 / (local / vec(particle.semi_axes)).length()
+}
+
 /// Smoothed transmittance and sky visibility of particle `index` of the grid.
 #[must_use]
 pub fn smooth(grid: &Grid, p: &GridParams, transmittance: &[f64], smoothing: f64, index: usize) -> (f64, f64) {

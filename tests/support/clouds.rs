@@ -117,9 +117,7 @@ impl Stages {
                 rec.pass("grid", |rec| self.grid.record(rec, &setup.grid_params(), &self.set))?;
                 rec.pass("compact", |rec| self.compact.record(rec, &self.set, &planes, frame.camera))?;
                 rec.pass("tiling", |rec| self.tiling.record(rec, &setup.tiling_params(), &self.set))?;
-                rec.pass("lighting", |rec| {
-                    self.lighting.record(rec, &self.tiling, &self.set, Some(&self.grid), [1.0, 0.5, 0.25])
-                })?;
+                rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, &self.set, Some(&self.grid)))?;
                 self.counters.record(rec, &self.set);
                 Ok(rec.slot())
             })
