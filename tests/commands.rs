@@ -97,7 +97,10 @@ fn a_picture_its_transmittance_and_its_statistics() {
     assert!(stats["tables"].is_null(), "nothing here reads tables");
     let passes = stats["passes"].as_array().unwrap();
     let sum: f64 = passes.iter().map(|pass| pass["gpu_ms"].as_f64().unwrap()).sum();
-    assert!(!passes.is_empty() && (stats["frame_gpu_ms"].as_f64().unwrap() - sum).abs() < 1e-9);
+    assert!(
+        !passes.is_empty() && (stats["frame_gpu_ms"].as_f64().unwrap() - sum).abs() < 1e-5,
+        "up to rounding to 1 ns"
+    );
 }
 
 #[test]

@@ -183,9 +183,9 @@ impl Session {
             if !self.renderer.finish(&gpu, slot)? {
                 let times = frames.state().times(slot).into_iter();
                 let passes: Vec<_> =
-                    times.map(|pass| PassStats { name: pass.name.into(), gpu_ms: pass.gpu_ms }).collect();
-                let gpu_ms = (!passes.is_empty()).then(|| passes.iter().map(|pass| pass.gpu_ms).sum());
-                let wall_ms = started.elapsed().as_secs_f64() * 1000.0;
+                    times.map(|pass| PassStats { name: pass.name.into(), gpu_ms: to_ns(pass.gpu_ms) }).collect();
+                let gpu_ms = (!passes.is_empty()).then(|| to_ns(passes.iter().map(|pass| pass.gpu_ms).sum()));
+                let wall_ms = to_ns(started.elapsed().as_secs_f64() * 1000.0);
                 return Ok((slot, Times { passes, gpu_ms, wall_ms }));
             }
             frames.state().forget();
@@ -213,6 +213,11 @@ impl Session {
             display: display.into_iter().map(|[r, g, b, _]| [r, g, b].map(|v| f32::from(v) / 65_535.0)).collect(),
         }
     }
+}
+
+/// Milliseconds without the digits beyond a nanosecond, which no clock has.
+fn to_ns(milliseconds: f64) -> f64 {
+    (milliseconds * 1.0e6).round() / 1.0e6
 }
 
 fn scene_texel_bytes(precision: Precision) -> u64 {
