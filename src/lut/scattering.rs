@@ -48,7 +48,7 @@ pub struct LevelReport {
 impl LevelReport {
     pub(crate) const BYTES: usize = 32;
 
-    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+    pub(crate) fn to_bytes(self) -> Vec<u8> {
         [self.optical_radius, self.applications, self.residual, self.multiple]
             .iter()
             .flat_map(|v| v.to_le_bytes())

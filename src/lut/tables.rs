@@ -176,7 +176,7 @@ impl Tables {
                 let Some(reports) = built else { return Ok(None) };
                 tables.reports = reports;
                 let mut bytes = download(frames, tables.scattering.image())?;
-                bytes.extend(tables.reports.iter().flat_map(LevelReport::to_bytes));
+                bytes.extend(tables.reports.iter().flat_map(|report| report.to_bytes()));
                 tables.keep(path.as_deref(), &bytes);
             }
         }
