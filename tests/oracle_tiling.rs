@@ -52,6 +52,7 @@ fn lists_are_the_same_however_they_are_ordered() {
             stages.tiling = tiling(&device, &setup, 1 << 22, order);
             device.frames().state().forget();
             let counters = stages.run(&mut device, &setup);
+            assert!(counters.tile_nodes <= stages.tiling.node_capacity());
             let heads: Vec<u32> = read(&mut device, stages.tiling.heads(), setup.tiling_params().tile_count());
             let nodes: Vec<TileNode> = read(&mut device, stages.tiling.nodes(), counters.tile_nodes);
             lists(&heads, &nodes)

@@ -116,7 +116,9 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
     precise float inside_squared = inside_left * inside_left;
     precise float shoulder = 1.0 - inside_squared;
     precise float turret = turret_field(position, f, p.seed);
-    precise float turret_term = turret * 0.62;
+    precise float from_mean = turret - 0.4;
+    precise float resolved = from_mean * p.ring_layer[place.ring].z;
+    precise float turret_term = (resolved + 0.4) * 0.62;
     precise float tower = turret_term + 0.38;
     precise float relative = shoulder * tower;
     precise float raised = relative * 0.92;

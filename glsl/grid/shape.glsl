@@ -39,17 +39,18 @@ Ball column_ball(CellPlace place, CellShape shape, uint layer, in GridParams p) 
     float taper = 1.0 - 0.42 * up * up;
     float outline = 0.45 + 0.55 * shape.body;
     float rare = float(h0 & 255u) / 256.0;
-    float size = 0.8 + 0.3 * unit_float(h0) + 0.45 * (rare * rare) * (rare * rare);
+    float size = 0.64 + 0.4 * unit_float(h0) + 0.6 * rare * rare;
     ball.across = edge * 1.2 * taper * outline * size;
     // The lowest layer stays flat: its undersides are the cloud's base.
     float tall = max(0.62 * step, 0.8 * ball.across) * (0.9 + 0.25 * unit_float(h1));
     if (layer == 0u) tall = min(tall, 0.8 * step);
     ball.tall = tall;
 
-    // Horizontal jitter ±0.4 cells, vertical ±0.15 of the height; the lowest layer stays near its plane.
+    // Horizontal jitter ±0.4 cells, vertical ±0.15 of the height. The lowest layer stands on the base, near its plane.
     float jitter = layer == 0u ? 0.03 : 0.15;
+    float up_metres = layer == 0u ? max(0.5 * step, 0.8 * tall) : (float(layer) + 0.5) * step;
     vec2 xz = place.centre + vec2(signed_float(h2), signed_float(h3)) * (0.4 * edge);
-    float y = base_height(xz - p.camera.xz, p) + (float(layer) + 0.5) * step + signed_float(h4) * jitter * 2.0 * tall;
+    float y = base_height(xz - p.camera.xz, p) + up_metres + signed_float(h4) * jitter * 2.0 * tall;
     ball.centre = vec3(xz.x, y, xz.y);
     return ball;
 }

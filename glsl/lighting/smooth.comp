@@ -1,5 +1,6 @@
-// Diffusion of light in the body of a cloud: a low-pass filter of the sun's transmittance over a particle and its six
-// neighbours in the grid, weighted with their density, and the share of the sky that the particle sees. Yusov 5.3, step 3.
+// Diffusion of light in the body of a cloud: a low-pass filter of the sun's transmittance over a particle and its
+// neighbours in the grid (above, below and eight around), weighted with their density, and the share of the sky that
+// the particle sees. Yusov 5.3, step 3.
 // Every layer has both its neighbours, layer 1 its lower one too (which Yusov's released code skips). A puff has the ball
 // that carries it.
 // Explicit particles have no neighbours in a grid: no smoothing.
@@ -64,8 +65,9 @@ void main() {
                 uint neighbour = uint(int(cell) + dz * int(dim) + dx);
                 CellShape there = unpack_shape(cell_shapes.shape[neighbour]);
                 open += sky_openness(there.height - height);
-                if (!puff && abs(dx) + abs(dz) == 1 && layer < there.layers) {
-                    add(cell_first.first[neighbour] + layer, push.smoothing, weighted, weights);
+                if (!puff && neighbour != cell && layer < there.layers) {
+                    float share = dx == 0 || dz == 0 ? 1.0 : 0.5; // diagonals are farther away
+                    add(cell_first.first[neighbour] + layer, share * push.smoothing, weighted, weights);
                 }
             }
         }

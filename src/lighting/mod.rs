@@ -18,7 +18,7 @@ use crate::shaders::{lighting_smooth_comp as smooth, lighting_sun_comp as sun};
 use crate::tiling::Tiling;
 
 /// Weight of a grid neighbour in smoothing, against 1 of the particle itself (tuned).
-pub const SMOOTHING: f32 = 0.7;
+pub const SMOOTHING: f32 = 0.8;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -131,7 +131,8 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     let inside = (excess * 1.0).min(1.0);
     let left = 1.0 - inside;
     let shoulder = 1.0 - left * left;
-    let tower = turret_field(position, f, p.seed) * 0.62 + 0.38;
+    let resolved = (turret_field(position, f, p.seed) - 0.4) * p.ring_layer[place.ring as usize][2];
+    let tower = (resolved + 0.4) * 0.62 + 0.38;
     let fraction = (shoulder * tower) * 0.92 + 0.08;
     let height = fraction * p.thickness;
     let steps_up = height * p.ring_layer[place.ring as usize][1];
@@ -193,7 +194,7 @@ fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams)
     let up = (layer as f32 + 0.5) / shape.layers as f32;
 
     let rare = (h[0] & 255) as f32 / 256.0;
-    let size = 0.8 + 0.3 * unit_float(h[0]) + 0.45 * (rare * rare) * (rare * rare);
+    let size = 0.64 + 0.4 * unit_float(h[0]) + 0.6 * rare * rare;
     let across = edge * 1.2 * (1.0 - 0.42 * up * up) * (0.45 + 0.55 * shape.body) * size;
     let tall = (0.62 * step).max(0.8 * across) * (0.9 + 0.25 * unit_float(h[1]));
     let tall = if layer == 0 { tall.min(0.8 * step) } else { tall };
@@ -203,7 +204,8 @@ fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams)
     let z = place.centre[1] + signed_float(h[3]) * (0.4 * edge);
     let (dx, dz) = (x - p.camera[0], z - p.camera[2]);
     let base = p.altitude - (dx * dx + dz * dz) * p.inverse_diameter;
-    let y = base + (layer as f32 + 0.5) * step + signed_float(h[4]) * jitter * 2.0 * tall;
+    let up_metres = if layer == 0 { (0.5 * step).max(0.8 * tall) } else { (layer as f32 + 0.5) * step };
+    let y = base + up_metres + signed_float(h[4]) * jitter * 2.0 * tall;
     Ball { centre: [x, y, z], across, tall, id, hash: h[5] }
 }
 

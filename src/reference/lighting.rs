@@ -77,9 +77,10 @@ pub fn smooth(grid: &Grid, p: &GridParams, transmittance: &[f64], smoothing: f64
     if !puff && layer + 1 < shape.layers {
         slots.push((index + 1, smoothing));
     }
-    for (dx, dz) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {
+    for (dx, dz) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
         if let Some(other) = neighbour(dx, dz).filter(|&other| !puff && layer < grid.shapes[other].layers) {
-            slots.push((grid.first[other] as usize + layer as usize, smoothing));
+            let share = if dx == 0 || dz == 0 { 1.0 } else { 0.5 };
+            slots.push((grid.first[other] as usize + layer as usize, share * smoothing));
         }
     }
     let (mut weighted, mut weights) = (0.0, 0.0);

@@ -132,8 +132,10 @@ impl TilingParams {
                     greatest[axis] = greatest[axis].max(along);
                 }
             }
-            // A metre of margin, for receivers on the border.
-            let per_metre = [0, 1].map(|i| f64::from(TILE_DIM) / (greatest[i] - least[i] + 2.0));
+            // A metre of margin, for receivers on the border. A low sun squeezes the level in v: tiles stay at least a
+            // quarter as high as wide, or every particle would cover many; some are then left over.
+            let mut per_metre = [0, 1].map(|i| f64::from(TILE_DIM) / (greatest[i] - least[i] + 2.0));
+            per_metre[1] = per_metre[1].min(4.0 * per_metre[0]);
             params.level_rect[level] =
                 [least[0] - 1.0, least[1] - 1.0, per_metre[0], per_metre[1]].map(|value| value as f32);
             params.level_range[level] = [inner as f32, half as f32, 0.0, 0.0];
