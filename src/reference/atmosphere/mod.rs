@@ -1,7 +1,7 @@
 //! The clear air in f64: the oracle for `glsl/atmosphere`, with the same tables, mappings and step counts.
 //!
 //! The geometry is written the obvious way, with radii and square roots: at f64 it needs none of the care the shaders
-//! take. [`Sky`] holds the tables and answers what a pixel asks; [`Air`]'s methods are the physics below them.
+//! take. [`AirTables`] holds the tables and answers what a pixel asks; [`Air`]'s methods are the physics below them.
 
 mod mapping;
 mod tables;
