@@ -97,11 +97,12 @@ struct FieldFrequencies {
 };
 
 // Positive far inside a cloud, lowest in clear sky; compared with a threshold that gives the wanted coverage.
-float coverage_field(ivec2 position, FieldFrequencies f, uint seed) {
+// `resolved`: share of fine detail that the caller's cells can show; 1 is the field itself.
+float coverage_field(ivec2 position, FieldFrequencies f, uint seed, float resolved) {
     precise float heap = heaps(lattice_point(position, f.heap), seed) * 1.35;
     precise float n1 = gradient_noise(lattice_point(position, f.billow), seed + 1u) * 0.5;
-    precise float n2 = gradient_noise(lattice_point(position, f.billow * 2), seed + 2u) * 0.28;
-    precise float n3 = gradient_noise(lattice_point(position, f.billow * 4), seed + 3u) * 0.15;
+    precise float n2 = gradient_noise(lattice_point(position, f.billow * 2), seed + 2u) * 0.28 * resolved;
+    precise float n3 = gradient_noise(lattice_point(position, f.billow * 4), seed + 3u) * 0.15 * resolved * resolved;
     // Yusov's reference values: noise at 1/20 km and at 1/200 km, multiplied, gather the heaps into fields and streaks.
     precise float streak = gradient_noise(lattice_point(position, f.streak), seed + 4u) + 0.75;
     precise float region = gradient_noise(lattice_point(position, f.region), seed + 5u) + 1.0;

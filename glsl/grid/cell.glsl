@@ -107,7 +107,7 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
     int steps = p.ring_first[place.ring].w;
     ivec2 position = place.absolute * steps + (steps >> 1);
     FieldFrequencies f = field_frequencies(p);
-    precise float field = coverage_field(position, f, p.seed);
+    precise float field = coverage_field(position, f, p.seed, p.ring_layer[place.ring].z);
     precise float excess = field - coverage_threshold(coverage, p);
     if (!(excess > 0.0)) return shape;
     // The column rises steeply from the outline, then follows the turrets: 2t - t² has a vertical-looking shoulder.

@@ -9,7 +9,7 @@ const uint THRESHOLDS = 65u; // knots of the coverage → threshold curve
 struct GridParams {
     ivec4 ring_first[RING_CAPACITY]; // xy: absolute index (x, z) of the ring's first cell; z: layers at full thickness; w: position steps per cell edge
     vec4 ring_frame[RING_CAPACITY];  // xy: corner of that cell [m, floating origin]; z: cell edge [m]; w: 1 / edge
-    vec4 ring_layer[RING_CAPACITY];  // x: layer step [m]; y: 1 / step; z: share of the turrets that cells resolve; w: unused
+    vec4 ring_layer[RING_CAPACITY];  // x: layer step [m]; y: 1 / step; z: share of fine detail that cells resolve; w: unused
     vec4 threshold[17];              // field value above which a share i/64 of the world lies, four to a vector
     vec3 camera;                     // camera [m, floating origin]
     float altitude;                  // cloud base above sea level [m]

@@ -97,7 +97,7 @@ Particle column_particle(CellPlace place, CellShape shape, uint index, in GridPa
 
     Particle particle;
     particle.centre = ball.centre;
-    particle.density = p.density * (0.2 + 0.8 * shape.body);
+    particle.density = p.density * (0.1 + 0.9 * shape.body * (0.4 + 0.6 * shape.body));
     particle.rotation = rotation;
     particle.semi_axes = semi_axes;
     particle.fade = shape.weight;

@@ -61,7 +61,7 @@ pub fn coverage_curve(f: FieldFrequencies, step: f64, seed: u32) -> [f32; 68] {
     let place = |i: u32, alpha: f64| ((f64::from(i) * alpha).fract() * 2.0 - 1.0) * half_width;
     let mut field: Vec<f32> = (1..=SAMPLES)
         .map(|i| [place(i, 0.754_877_666_246_692_8) as i32, place(i, 0.569_840_290_998_053_3) as i32])
-        .map(|position| coverage_field(position, f, seed))
+        .map(|position| coverage_field(position, f, seed, 1.0))
         .collect();
     field.sort_unstable_by(f32::total_cmp);
     let mut curve = [0.0; 68];
@@ -91,7 +91,7 @@ mod tests {
         let place = |h: u32| (f64::from(h) / f64::from(u32::MAX) * 2.0 - 1.0) * 1.5e6 / step;
         let hits = (0..20_000u32).filter(|&i| {
             let position = [place(pcg(2 * i)) as i32, place(pcg(2 * i + 1)) as i32];
-            coverage_field(position, f, seed) > threshold
+            coverage_field(position, f, seed, 1.0) > threshold
         });
         hits.count() as f64 / 20_000.0
     }

@@ -24,7 +24,7 @@ pub struct GridParams {
     pub ring_first: [[i32; 4]; RING_CAPACITY],
     /// Corner (x, z) of that cell [m, floating origin]; cell edge [m]; 1 / edge.
     pub ring_frame: [[f32; 4]; RING_CAPACITY],
-    /// Layer step [m]; 1 / step; share of the turrets that cells of this size resolve; unused.
+    /// Layer step [m]; 1 / step; share of fine detail that cells of this size resolve; unused.
     pub ring_layer: [[f32; 4]; RING_CAPACITY],
     /// Field value above which a share i/64 of the world lies.
     pub threshold: [[f32; 4]; 17],
@@ -135,7 +135,8 @@ impl GridDesign {
             // Cells double, so do their particles: half the layers fill the same height.
             let here = (f64::from(layers) / f64::from(1u32 << ring)).round().max(1.0) as i32;
             let layer_step = clouds.thickness / here as f32;
-            // Turrets are 900 m apart: three cells show one well, cells as large as that would sample noise.
+            // Turrets are 900 m apart and the outline's second octave 650 m: a few cells show them well, cells as large
+            // as that would sample noise, and the far field would fall apart into dots.
             let resolved = (300.0 / (cell_edge * f64::from(1u32 << ring))).min(1.0) as f32;
             fixed.ring_first[ring] = [0, 0, here, STEPS_PER_CELL << ring];
             fixed.ring_layer[ring] = [layer_step, 1.0 / layer_step, resolved, 0.0];

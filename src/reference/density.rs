@@ -111,14 +111,15 @@ pub struct FieldFrequencies {
     pub region: i32,
 }
 
-/// Positive far inside a cloud, lowest in clear sky.
+/// Positive far inside a cloud, lowest in clear sky. `resolved`: share of fine detail that the caller's cells can show; 1
+/// is the field itself.
 #[must_use]
-pub fn coverage_field(position: [i32; 2], f: FieldFrequencies, seed: u32) -> f32 {
+pub fn coverage_field(position: [i32; 2], f: FieldFrequencies, seed: u32, resolved: f32) -> f32 {
     let octave = |index: u32| seed.wrapping_add(index);
     let heap = heaps(lattice_point(position, f.heap), seed) * 1.35;
     let n1 = gradient_noise(lattice_point(position, f.billow), octave(1)) * 0.5;
-    let n2 = gradient_noise(lattice_point(position, f.billow * 2), octave(2)) * 0.28;
-    let n3 = gradient_noise(lattice_point(position, f.billow * 4), octave(3)) * 0.15;
+    let n2 = gradient_noise(lattice_point(position, f.billow * 2), octave(2)) * 0.28 * resolved;
+    let n3 = gradient_noise(lattice_point(position, f.billow * 4), octave(3)) * 0.15 * resolved * resolved;
     let streak = gradient_noise(lattice_point(position, f.streak), octave(4)) + 0.75;
     let region = gradient_noise(lattice_point(position, f.region), octave(5)) + 1.0;
     let weather = (streak * region) * 0.55;
@@ -156,9 +157,9 @@ mod tests {
     #[test]
     fn the_field_is_continuous_across_lattice_borders() {
         let f = FieldFrequencies { heap: 1 << 22, billow: 1 << 23, turret: 1 << 23, streak: 1 << 19, region: 1 << 16 };
-        let mut previous = coverage_field([-5000, 777], f, 3);
+        let mut previous = coverage_field([-5000, 777], f, 3, 1.0);
         for x in -4999..5000 {
-            let value = coverage_field([x, 777], f, 3);
+            let value = coverage_field([x, 777], f, 3, 1.0);
             // The steepest slope: heaps 2·1.09·√(3.45)·(2⁻¹⁰ a step) and noise, below 0.02 a step of this size.
             assert!((value - previous).abs() < 0.02, "jump of {} at {x}", value - previous);
             previous = value;

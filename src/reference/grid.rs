@@ -124,7 +124,8 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     }
     let position = cell_position(place, p);
     let f = p.frequencies();
-    let excess = coverage_field(position, f, p.seed) - coverage_threshold(coverage, p);
+    let excess =
+        coverage_field(position, f, p.seed, p.ring_layer[place.ring as usize][2]) - coverage_threshold(coverage, p);
     if excess <= 0.0 {
         return empty;
     }
@@ -248,7 +249,7 @@ pub fn column_particle(place: &CellPlace, shape: &CellShape, index: u32, p: &Gri
     };
     Particle {
         centre: ball.centre,
-        density: p.density * (0.2 + 0.8 * shape.body),
+        density: p.density * (0.1 + 0.9 * shape.body * (0.4 + 0.6 * shape.body)),
         rotation,
         semi_axes,
         fade: shape.weight,
