@@ -1,20 +1,9 @@
 //! What a device can do, probed once, with a printable reason for everything that it cannot.
 
+use super::DeviceFeatures;
+use super::features::limits_missing;
 use ash::vk;
 use std::ffi::CStr;
-
-/// Device features that Welkin must have, by their Vulkan names. An engine that lends its device enables these.
-pub const FEATURES_WANTED: [&str; 9] = [
-    "apiVersion >= 1.3",
-    "synchronization2",
-    "dynamicRendering",
-    "timelineSemaphore",
-    "shaderDemoteToHelperInvocation",
-    "fragmentStoresAndAtomics",
-    "independentBlend",
-    "shaderStorageImageExtendedFormats",
-    "shaderStorageImageWriteWithoutFormat",
-];
 
 /// Features that Welkin uses where they exist.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -94,25 +83,25 @@ impl Capabilities {
         // SAFETY: as above.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical_device) };
         let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-        let family = queue_family
-            .or_else(|| families.iter().position(|f| f.queue_flags.contains(wanted)).map(|index| index as u32));
+        let able = |f: &vk::QueueFamilyProperties| f.queue_flags.contains(wanted);
+        let family = match queue_family {
+            Some(index) => families.get(index as usize).is_some_and(able).then_some(index),
+            None => families.iter().position(able).map(|index| index as u32),
+        };
 
         let mut missing = Vec::new();
-        let mut need = |present: bool, what: &str| {
-            if !present {
-                missing.push(what.to_owned());
-            }
-        };
-        need((major, minor) >= (1, 3), &format!("Vulkan 1.3 (the device has {major}.{minor})"));
-        need(v13.synchronization2 != 0, "synchronization2");
-        need(v13.dynamic_rendering != 0, "dynamicRendering");
-        need(v13.shader_demote_to_helper_invocation != 0, "shaderDemoteToHelperInvocation");
-        need(v12.timeline_semaphore != 0, "timelineSemaphore");
-        need(core.fragment_stores_and_atomics != 0, "fragmentStoresAndAtomics");
-        need(core.independent_blend != 0, "independentBlend");
-        need(core.shader_storage_image_extended_formats != 0, "shaderStorageImageExtendedFormats");
-        need(core.shader_storage_image_write_without_format != 0, "shaderStorageImageWriteWithoutFormat");
-        need(family.is_some(), "a queue with graphics and compute");
+        if (major, minor) < (1, 3) {
+            missing.push(format!("Vulkan 1.3 (the device has {major}.{minor})"));
+        }
+        let features = DeviceFeatures::from_vulkan(&core, &v12, &v13);
+        missing.extend(features.missing().into_iter().map(str::to_owned));
+        missing.extend(limits_missing(&p.limits));
+        if family.is_none() {
+            missing.push(match queue_family {
+                Some(index) => format!("graphics and compute on queue family {index}"),
+                None => "a queue with graphics and compute".to_owned(),
+            });
+        }
 
         let queue_family = family.unwrap_or(0);
         let valid_bits = families.get(queue_family as usize).map_or(0, |f| f.timestamp_valid_bits);

@@ -3,7 +3,7 @@
 use super::image::Sampler;
 use super::memory::{Accounting, Allocator, DefaultAllocator, MemoryUse};
 use super::pipeline::{DefaultFactory, PipelineFactory};
-use super::{Capabilities, Feature};
+use super::{Capabilities, DeviceFeatures, Feature};
 use crate::{Error, Result};
 use ash::vk::{self, Handle};
 use std::any::Any;
@@ -23,19 +23,22 @@ pub struct RawDevice {
     pub instance: ash::Instance,
     /// The physical device behind it.
     pub physical_device: vk::PhysicalDevice,
-    /// The device, created with at least [`FEATURES_WANTED`](super::FEATURES_WANTED).
+    /// The device, created with at least [`DeviceFeatures::WANTED`].
     pub device: ash::Device,
     /// Family of the queue that will execute what is recorded; graphics and compute.
     pub queue_family: u32,
-    /// Whether `fragmentShaderPixelInterlock` was enabled.
+    /// What was enabled when the device was created. Vulkan cannot be asked, so this is where a forgotten feature is found.
+    pub features: DeviceFeatures,
+    /// Whether `fragmentShaderPixelInterlock` was enabled, on a device made with `VK_EXT_fragment_shader_interlock`.
     pub interlock: bool,
-    /// Whether `rasterizationOrderColorAttachmentAccess` was enabled.
+    /// Whether `rasterizationOrderColorAttachmentAccess` was enabled, with its extension.
     pub attachment_access: bool,
     /// Whether `VK_EXT_debug_utils` was enabled on the instance: objects and passes then get names.
     pub debug_utils: bool,
-    /// Source of device memory; none takes `gpu-allocator`.
+    /// Source of device memory; none takes `gpu-allocator`. It is dropped with the last user of the device, when every
+    /// piece has been given back.
     pub allocator: Option<Box<dyn Allocator>>,
-    /// Pipeline cache to use; none makes an own one.
+    /// Pipeline cache to use, which stays the host's; none makes an own one.
     pub pipeline_cache: Option<vk::PipelineCache>,
     /// Who builds the pipelines; none builds them as described.
     pub factory: Option<Box<dyn PipelineFactory>>,
@@ -62,18 +65,29 @@ impl Gpu {
     /// Takes over a device that somebody else owns.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] if the device lacks something of [`FEATURES_WANTED`](super::FEATURES_WANTED).
+    /// [`Error::Unsupported`] naming everything that is missing, if the device lacks a feature or limit
+    /// ([`FEATURES_WANTED`](super::FEATURES_WANTED), [`limits_wanted`](super::limits_wanted)), if one was not enabled, or
+    /// if the queue family cannot do graphics and compute. Optional features that were not enabled are no error: the blend
+    /// mode `auto` goes without them and says so.
     ///
     /// # Safety
-    /// - The handles belong together and stay valid until the last clone of the returned `Arc`, and everything made
-    ///   with it, is gone (`keep_alive` may hold their owner).
-    /// - The device was created with every feature of [`FEATURES_WANTED`](super::FEATURES_WANTED), and with the optional
-    ///   ones that are flagged.
+    /// - The handles belong together, and stay valid until the last clone of the returned `Arc` and everything made with
+    ///   it are gone (`keep_alive` may hold their owner).
+    /// - The device was created with what `features`, `interlock`, `attachment_access` and `debug_utils` say.
     /// - Recorded commands are submitted to a queue of `queue_family`.
+    /// - A lent `pipeline_cache` was not made with `EXTERNALLY_SYNCHRONIZED`, or nobody else uses it while Welkin builds
+    ///   pipelines.
     pub unsafe fn from_raw(raw: RawDevice) -> Result<Arc<Self>> {
         let mut capabilities = Capabilities::probe(&raw.instance, raw.physical_device, Some(raw.queue_family));
         if !capabilities.missing.is_empty() {
             return Err(Error::Unsupported { needed: capabilities.missing.join(", "), by: capabilities.device_name });
+        }
+        let disabled = raw.features.missing();
+        if !disabled.is_empty() {
+            return Err(Error::Unsupported {
+                needed: disabled.join(", "),
+                by: format!("{} as it was created: the host did not enable it", capabilities.device_name),
+            });
         }
         if !raw.interlock {
             capabilities.withhold(Feature::FragmentShaderInterlock);

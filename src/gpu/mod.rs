@@ -8,6 +8,7 @@ mod access;
 mod buffer;
 mod capabilities;
 mod device;
+mod features;
 mod frames;
 mod image;
 mod memory;
@@ -19,8 +20,9 @@ mod timing;
 
 pub use access::Access;
 pub use buffer::{Buffer, BufferKind};
-pub use capabilities::{Capabilities, FEATURES_WANTED, Feature};
+pub use capabilities::{Capabilities, Feature};
 pub use device::{Gpu, RawDevice};
+pub use features::{DeviceFeatures, FEATURES_WANTED, LimitWanted, limits_wanted};
 pub use frames::Frames;
 pub use image::{Image, ImageDesc, Sampled, Sampler};
 pub use memory::{Allocation, Allocator, MemoryLocation, MemoryUse};

@@ -1,6 +1,6 @@
 //! A device of our own, for the command line, the tests and the examples. An engine does not need this file.
 
-use super::{Capabilities, Feature, Frames, Gpu, PipelineFactory, RawDevice};
+use super::{Capabilities, DeviceFeatures, Feature, Frames, Gpu, PipelineFactory, RawDevice};
 use crate::{Error, Result};
 use ash::vk;
 use std::ffi::{CStr, c_void};
@@ -28,6 +28,17 @@ const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 pub struct Messages(Arc<Mutex<Vec<String>>>);
 
 impl Messages {
+    /// Describes a messenger that collects every validation warning and error here, for an instance of the host's own
+    /// with `VK_EXT_debug_utils`. These messages must outlive the messenger.
+    pub fn messenger(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+        use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
+        vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(Severity::ERROR | Severity::WARNING)
+            .message_type(Type::VALIDATION)
+            .pfn_user_callback(Some(collect))
+            .user_data(Arc::as_ptr(&self.0).cast_mut().cast())
+    }
+
     /// Everything said so far: warnings and errors.
     pub fn all(&self) -> Vec<String> {
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
@@ -70,6 +81,7 @@ impl Standalone {
             physical_device,
             device,
             queue_family: capabilities.queue_family,
+            features: DeviceFeatures::WANTED,
             interlock,
             attachment_access,
             debug_utils: instance.debug.is_some(),
@@ -78,7 +90,7 @@ impl Standalone {
             factory: options.factory,
             keep_alive: Some(Box::new(owner)),
         };
-        // SAFETY: the handles were created above with the features that `FEATURES_WANTED` lists; `keep_alive` owns them.
+        // SAFETY: the handles were created above with `DeviceFeatures::WANTED`; `keep_alive` owns them.
         let gpu = unsafe { Gpu::from_raw(raw) }?;
         // SAFETY: the family was created with one queue.
         let queue = unsafe { gpu.device().get_device_queue(capabilities.queue_family, 0) };
@@ -209,12 +221,7 @@ impl Instance {
             let utils = ash::ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
             let mut messenger = vk::DebugUtilsMessengerEXT::null();
             if validation {
-                use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
-                let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
-                    .message_severity(Severity::ERROR | Severity::WARNING)
-                    .message_type(Type::VALIDATION)
-                    .pfn_user_callback(Some(collect))
-                    .user_data(Arc::as_ptr(&instance.messages.0).cast_mut().cast());
+                let info = instance.messages.messenger();
                 // SAFETY: the messages live as long as `instance`, which destroys the messenger before them.
                 messenger = unsafe { utils.create_debug_utils_messenger(&info, None) }.unwrap_or_default();
             }
@@ -320,16 +327,8 @@ fn create_device(
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
     let mut extensions = Vec::new();
-    let core = vk::PhysicalDeviceFeatures::default()
-        .fragment_stores_and_atomics(true)
-        .independent_blend(true)
-        .shader_storage_image_extended_formats(true)
-        .shader_storage_image_write_without_format(true);
-    let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
-        .synchronization2(true)
-        .dynamic_rendering(true)
-        .shader_demote_to_helper_invocation(true);
+    let (mut core, mut v12, mut v13) = Default::default();
+    DeviceFeatures::WANTED.enable(&mut core, &mut v12, &mut v13);
     let mut ordered =
         vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT::default().fragment_shader_pixel_interlock(true);
     let mut attachment = vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT::default()
