@@ -9,6 +9,7 @@ pub mod density;
 pub mod detail;
 pub mod error;
 pub mod film;
+pub mod frame;
 pub mod gpu;
 pub mod grid;
 pub mod lighting;

@@ -11,30 +11,23 @@ use crate::blend::{BlendInputs, Blender, Choice, CloudTargets, Shading, choose};
 use crate::compact::{Compact, frustum_planes};
 use crate::detail::DetailTile;
 use crate::film::Film;
-use crate::gpu::{Buffer, BufferKind, Gpu, Image, Recorder};
+use crate::frame::{FrameInputs, FrameOutput, assert_size};
+use crate::gpu::{Buffer, BufferKind, Gpu, Image, ImageDesc, Recorder};
 use crate::grid::{CounterReadback, Counters, Grid, GridDesign, ParticleList, ParticleSet};
 use crate::lighting::Lighting;
-use crate::params::{Camera, Params, SkyModel, Source, Style};
+use crate::params::{Camera, Lighting as LightingKind, Params, SkyModel, Source, Style, Sun, SunPosition};
 use crate::shared::FrameParams;
 use crate::tiling::{Slab, Tiling, TilingParams};
+use ash::vk;
 use std::sync::Arc;
+
+pub use crate::frame::TableImages;
 
 /// Radius of the planet at sea level [m].
 pub const PLANET_RADIUS: f64 = 6.36e6;
 
 /// Light list nodes to begin with, per particle that fits.
 const NODES_PER_PARTICLE: u32 = 10;
-
-/// The particle tables that shading reads.
-#[derive(Clone, Copy)]
-pub struct TableImages<'a> {
-    /// Optical depth of the reference particle (Yusov 4.1).
-    pub optical_depth: &'a Image,
-    /// Single and multiple scattering of the homogeneous sphere (Yusov 4.2, 4.3).
-    pub scattering: &'a Image,
-    /// Mean of the density profile along a chord through the middle of the particle.
-    pub fill: f32,
-}
 
 /// Where the particles come from.
 enum Particles {
@@ -64,6 +57,8 @@ pub struct Renderer {
     shadow: CloudShadow,
     film: Film,
     counters: CounterReadback,
+    /// Stands in for tables that nothing reads.
+    no_table: Image,
 }
 
 /// Sizes of the lists and what the last frame wanted of them.
@@ -78,7 +73,13 @@ pub struct ListUse {
 }
 
 impl Renderer {
-    /// Pipelines, lists and targets for `params` at `extent` pixels, with `slots` frames in flight.
+    /// Pipelines, lists and targets for `params` at `extent` pixels, with `slots` frames in flight. Everything that is
+    /// compiled is compiled here, and everything that is allocated is allocated here or in [`Self::finish`].
+    ///
+    /// # Errors
+    /// [`Error::InvalidParam`](crate::Error::InvalidParam) for parameters out of range;
+    /// [`Error::Unsupported`](crate::Error::Unsupported), with the reason, for a blend mode that the device lacks;
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(gpu: &Arc<Gpu>, params: &Params, extent: [u32; 2], slots: usize) -> Result<Self> {
         params.validate()?;
         let quality = &params.quality;
@@ -122,6 +123,15 @@ impl Renderer {
             shadow: CloudShadow::new(gpu)?,
             film: Film::new(gpu, extent, quality.precision)?,
             counters: CounterReadback::new(gpu, slots)?,
+            no_table: Image::new(
+                gpu,
+                &ImageDesc {
+                    name: "no table",
+                    extent: [1, 1, 2],
+                    format: vk::Format::R16G16_SFLOAT,
+                    usage: vk::ImageUsageFlags::SAMPLED,
+                },
+            )?,
             params: params.clone(),
             extent,
             low_extent,
@@ -149,9 +159,65 @@ impl Renderer {
         &self.film
     }
 
-    /// Records one frame seen by `camera`.
+    /// Moves the sun, from the next frame on. Its irradiance and size stay as they were.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParam`](crate::Error::InvalidParam) if an angle is out of range.
+    pub fn set_sun(&mut self, position: SunPosition) -> Result<()> {
+        let sun = Sun { position, ..self.params.sun };
+        sun.validate()?;
+        self.params.sun = sun;
+        Ok(())
+    }
+
+    /// Records one frame seen by `camera` into the renderer's own images: [`Self::film`], [`Self::targets`].
     pub fn record(&mut self, rec: &mut Recorder<'_>, camera: &Camera, tables: TableImages<'_>) -> Result<()> {
-        let slot = rec.slot();
+        self.record_frame(rec, &FrameInputs::new(camera, tables), None)
+    }
+
+    /// Records one frame of `inputs`, with `output` into an image of the host's.
+    ///
+    /// Only commands are recorded: nothing is submitted, waited for, allocated or compiled. (The first frame also fills the
+    /// noise tile and the air's tables.) The caller owes:
+    ///
+    /// - what [`RecorderState::begin`](crate::gpu::RecorderState::begin) asks: above all, that the last frame of this slot
+    ///   has ended on the device, since its parameters are overwritten now;
+    /// - lent images in the layout that their entry names, the access named there being the last one; on return of the
+    ///   call the commands leave them in their exit layout, and a command of the host's with the exit access needs no
+    ///   barrier of its own;
+    /// - a barrier of its own before it uses an image of the renderer's ([`Self::film`], [`Self::targets`]) itself:
+    ///   [`Recorder::share`] records it;
+    /// - frames of one renderer submitted in the order of their recording, to one queue or ordered by semaphores: they
+    ///   share lists and images;
+    /// - when a frame has ended, a look at [`Self::wants_more`].
+    ///
+    /// # Panics
+    /// If the tables are missing although the particles need them, or if a lent image has another size or format than
+    /// [`FrameInputs`] and [`FrameOutput`] ask for.
+    pub fn record_frame(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        inputs: &FrameInputs<'_>,
+        output: Option<&FrameOutput<'_>>,
+    ) -> Result<()> {
+        if let Some(lent) = &inputs.opaque_distance {
+            assert_size(lent.image, self.extent);
+            rec.acquire(lent.image, lent.entry.0, lent.entry.1);
+        }
+        self.record_passes(rec, inputs)?;
+        if let Some(lent) = &inputs.opaque_distance {
+            rec.release(lent.image, lent.exit.0, lent.exit.1);
+        }
+        output.map_or(Ok(()), |output| output.output.record(rec, &self.film, &output.target))
+    }
+
+    fn record_passes(&mut self, rec: &mut Recorder<'_>, inputs: &FrameInputs<'_>) -> Result<()> {
+        let camera = inputs.camera;
+        let (no_table, slot) = (&self.no_table, rec.slot());
+        let clouds = &self.params.clouds;
+        let needs_tables = clouds.style != Style::Homogeneous || clouds.lighting != LightingKind::Flat;
+        assert!(inputs.tables.is_some() || !needs_tables, "the scene's particles need their tables");
+        let tables = inputs.tables.unwrap_or(TableImages { optical_depth: no_table, scattering: no_table, fill: 1.0 });
         let origin = floating_origin(camera);
         let frame = self.frame_params(camera, origin, tables.fill);
         self.frame[slot].write(0, &[frame]);
@@ -215,7 +281,10 @@ impl Renderer {
         let (atmosphere, background) = (&self.atmosphere, &self.background);
         background.record_opaque(rec, atmosphere, frame_buffer)?;
         background.record(rec, atmosphere, frame_buffer, &self.shadow)?;
-        let inputs = BlendInputs {
+        if let Some(lent) = &inputs.opaque_distance {
+            background.record_lent(rec, lent.image)?;
+        }
+        let blend_inputs = BlendInputs {
             frame: &self.frame[slot],
             particles: self.set.particles(),
             order: self.compact.order(),
@@ -229,13 +298,20 @@ impl Renderer {
             draw_args: self.compact.args(),
             draw_args_offset: Compact::DRAW_ARGS,
         };
-        self.blender.record(rec, &inputs, &self.targets)?;
+        self.blender.record(rec, &blend_inputs, &self.targets)?;
         let cloud = background.record_cloud_air(rec, atmosphere, frame_buffer, &self.targets)?;
         let film = &self.film;
         film.record_composite(rec, cloud, &background.low_opaque, &background.opaque_distance, &background.radiance)?;
         film.record_tonemap(rec, &self.params.film, model)?;
         self.counters.record(rec, &self.set);
         Ok(())
+    }
+
+    /// Whether a list was too small for the frame in `slot`, which must have ended: it lacks particles or shadows. A host
+    /// then waits until the device is done with every frame of this renderer and calls [`Self::finish`].
+    #[must_use]
+    pub fn wants_more(&self, slot: usize) -> bool {
+        self.lists(slot).iter().any(|list| list.needed > list.capacity)
     }
 
     /// Looks at the counts of the frame in `slot`, which must have ended, and grows the lists that were too small. True

@@ -14,6 +14,11 @@ float srgb_encode(float x) {
     return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055;
 }
 
+// Its inverse.
+float srgb_decode(float x) {
+    return x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
+}
+
 vec3 display_value(vec3 radiance, vec3 gain, uint curve) {
     vec3 x = max(radiance * gain, 0.0);
     vec3 toned = curve == 0u ? vec3(filmic(x.r), filmic(x.g), filmic(x.b)) : min(x, 1.0);

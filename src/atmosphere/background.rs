@@ -7,7 +7,8 @@ use crate::gpu::{Buffer, ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampl
 use crate::params::{Precision, SkyModel};
 use crate::shaders::{
     atmosphere_background_comp as background, atmosphere_cloud_air_comp as cloud_air,
-    atmosphere_opaque_distance_comp as opaque_distance, atmosphere_opaque_reduce_comp as opaque_reduce,
+    atmosphere_opaque_distance_comp as opaque_distance, atmosphere_opaque_lent_comp as opaque_lent,
+    atmosphere_opaque_reduce_comp as opaque_reduce,
 };
 use crate::shared::assert_layout;
 use ash::vk;
@@ -32,6 +33,7 @@ pub struct Background {
     downscale: u32,
     distance: ComputePipeline,
     reduce: ComputePipeline,
+    lent: ComputePipeline,
     background: ComputePipeline,
     air: ComputePipeline,
     /// Distance along the ray to the opaque scene \[m\], 1e30 for none; full resolution.
@@ -61,6 +63,7 @@ impl Background {
             downscale,
             distance: ComputePipeline::new(gpu, &opaque_distance::PROGRAM, &[])?,
             reduce: ComputePipeline::new(gpu, &opaque_reduce::PROGRAM, &[])?,
+            lent: ComputePipeline::new(gpu, &opaque_lent::PROGRAM, &[])?,
             background: ComputePipeline::new(gpu, &background::PROGRAM, &[])?,
             air: ComputePipeline::new(gpu, &cloud_air::PROGRAM, &[])?,
             opaque_distance: image("opaque distance", extent, vk::Format::R32_SFLOAT)?,
@@ -82,13 +85,33 @@ impl Background {
                 opaque_distance::Bindings { air: &atmosphere.air, frame, opaque_distance: &self.opaque_distance };
             let [w, h, _] = self.opaque_distance.extent();
             rec.dispatch(&self.distance, &bindings, &(), [w, h, 1])?;
-            let bindings = opaque_reduce::Bindings {
-                opaque_distance: self.opaque_distance.sampled(Sampler::NearestClamp),
-                opaque_low: &self.low_opaque,
-            };
-            let [w, h, _] = self.low_opaque.extent();
-            rec.dispatch(&self.reduce, &bindings, &self.downscale, [w, h, 1])
+            self.record_reduce(rec)
         })
+    }
+
+    /// Puts a lent opaque scene in front, with or without a sky; after [`Self::record`], before `blend`. `lent` holds the
+    /// distance along the ray \[m\] at full resolution, 1e30 where there is nothing. Where it is the nearest,
+    /// [`Self::radiance`] becomes black: what the host's surface looks like is for the host to add.
+    pub fn record_lent(&self, rec: &mut Recorder<'_>, lent: &Image) -> Result<()> {
+        rec.pass("opaque", |rec| {
+            let bindings = opaque_lent::Bindings {
+                lent: lent.sampled(Sampler::NearestClamp),
+                opaque_distance: &self.opaque_distance,
+                radiance: &self.radiance,
+            };
+            let [w, h, _] = self.opaque_distance.extent();
+            rec.dispatch(&self.lent, &bindings, &(), [w, h, 1])?;
+            self.record_reduce(rec)
+        })
+    }
+
+    fn record_reduce(&self, rec: &mut Recorder<'_>) -> Result<()> {
+        let bindings = opaque_reduce::Bindings {
+            opaque_distance: self.opaque_distance.sampled(Sampler::NearestClamp),
+            opaque_low: &self.low_opaque,
+        };
+        let [w, h, _] = self.low_opaque.extent();
+        rec.dispatch(&self.reduce, &bindings, &self.downscale, [w, h, 1])
     }
 
     /// Fills [`Self::radiance`].

@@ -81,10 +81,13 @@ impl Image {
         Ok(image)
     }
 
-    /// Wraps an image that the host lends; nothing is destroyed on drop.
+    /// Wraps an image that the host lends; nothing is destroyed on drop. A host wraps each of its images once and keeps the
+    /// wrapper as long as the image; [`RecorderState::forget`](super::RecorderState::forget) drops the descriptor sets
+    /// of images that have gone.
     ///
     /// # Safety
-    /// `handle` and `view` must stay valid, and of this extent and format, while the returned image is used.
+    /// `handle` and `view` are of this extent and format, with one sample, level and layer of colour, and stay valid until
+    /// the device has ended every frame in which the returned image is used.
     pub unsafe fn borrow(
         gpu: &Arc<Gpu>,
         name: &str,

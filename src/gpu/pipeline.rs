@@ -134,12 +134,16 @@ impl fmt::Display for PipelineDesc {
 
 /// Builds pipelines from their descriptions. The default methods build exactly what is described.
 pub trait PipelineFactory: Send + Sync {
-    /// Called with every description before it is built; an engine may change state, formats or constants here.
+    /// Called with every description before it is built; an engine may change state, formats or constants here. The
+    /// program stays: its bindings are what the renderer binds. (Other shader code with the same bindings is a matter of
+    /// [`Self::build`].)
     fn describe(&self, desc: PipelineDesc) -> PipelineDesc {
         desc
     }
 
-    /// Builds the pipeline; `layout` has the bindings of `desc.program` in set 0 and its push constants.
+    /// Builds the pipeline; `layout` has the bindings of `desc.program` in set 0 and its push constants. An engine may
+    /// compile elsewhere, look up what it has compiled before, or call [`DefaultFactory`]'s `build`. Viewport and scissor
+    /// are dynamic state. The returned pipeline belongs to Welkin, which destroys it.
     fn build(&self, gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<vk::Pipeline> {
         build(gpu, desc, layout)
     }

@@ -3,7 +3,7 @@
 
 use super::access::{Barrier, ResourceState};
 use super::image::COLOR;
-use super::pipeline::{Pipeline, check_bindings};
+use super::pipeline::{Pipeline, PipelineKind, check_bindings};
 use super::timing::Timer;
 use super::{
     Access, BindingSet, Buffer, ComputePipeline, Gpu, GraphicsPipeline, Image, PassTime, Program, Resource, ShaderStage,
@@ -32,7 +32,8 @@ type SetKey = (usize, Vec<(u64, u8)>);
 const SETS_PER_POOL: u32 = 64;
 
 impl RecorderState {
-    /// State for `slots` frames in flight.
+    /// State for `slots` frames in flight. A host keeps one for all renderers that record into its command buffers: two
+    /// states know nothing of each other's accesses.
     pub fn new(gpu: &Arc<Gpu>, slots: usize) -> Result<Self> {
         Ok(Self {
             gpu: gpu.clone(),
@@ -45,11 +46,18 @@ impl RecorderState {
         })
     }
 
-    /// Starts recording frame slot `slot` into `cmd`.
+    /// Starts recording frame slot `slot` into `cmd`, which may already hold commands of the host's; the host goes on with
+    /// it when the [`Recorder`] is gone. State that the recording changes: bound pipelines and descriptor sets of both bind
+    /// points, push constants, viewport and scissor.
     ///
     /// # Safety
-    /// `cmd` is in the recording state, outside a render pass, and is submitted to a queue of the device's family before
-    /// any later recording of this state; the last frame of this slot has ended on the device.
+    /// - `cmd` is a primary command buffer in the recording state, outside a render pass, with no query active, and is
+    ///   submitted, once, to a queue of the device's family before what this state records later.
+    /// - The last frame of this slot has ended on the device.
+    /// - Buffers, images and pipelines that are recorded stay alive until the frame has ended on the device.
+    ///
+    /// # Panics
+    /// If there is no such slot.
     pub unsafe fn begin(&mut self, cmd: vk::CommandBuffer, slot: usize) -> Recorder<'_> {
         self.timers[slot].reset(cmd);
         Recorder { state: self, cmd, slot, pass: "" }
@@ -65,7 +73,8 @@ impl RecorderState {
         self.timers[slot].last_pass()
     }
 
-    /// Forgets descriptor sets and states, after resources have been replaced. The device must be idle.
+    /// Forgets descriptor sets and states, after resources have been replaced or lent images have gone. The device must
+    /// be done with every frame recorded so far.
     pub fn forget(&mut self) {
         self.sets.clear();
         self.resources.clear();
@@ -301,6 +310,7 @@ impl Recorder<'_> {
         draw: Draw<'_>,
     ) -> Result<()> {
         let mut extra: Vec<(u64, Access)> = Vec::new();
+        check_targets(pipeline, targets);
         for target in targets {
             self.initialise(target.image);
             extra.push((target.image.id, Access::ColorAttachment));
@@ -398,8 +408,15 @@ impl Recorder<'_> {
         self.transition("host", &[(buffer.id, Access::HostRead)]);
     }
 
+    /// Makes what Welkin has written to an image of its own visible to the host's next commands of kind `access`, in this
+    /// or a later command buffer of the queue. The image stays in `GENERAL` layout; later passes wait for that access.
+    pub fn share(&mut self, image: &Image, access: Access) {
+        self.initialise(image);
+        self.transition("share", &[(image.id, access)]);
+    }
+
     /// Takes over a lent image that was last used as `access` in `layout`; its contents are kept unless the layout is
-    /// `UNDEFINED`.
+    /// `UNDEFINED`. Every lent image is acquired before a pass uses it and released afterwards, in every frame anew.
     pub fn acquire(&mut self, image: &Image, access: Access, layout: vk::ImageLayout) {
         let (src_stage, src_access) = access.masks();
         self.layout(image, (src_stage, src_access), ALL, layout, vk::ImageLayout::GENERAL);
@@ -525,6 +542,20 @@ impl Recorder<'_> {
     pub fn device_lost(&self) -> Error {
         Error::DeviceLost { last_pass: self.state.last_pass(self.slot).to_owned() }
     }
+}
+
+/// Misuse of the interface, or of a [`PipelineFactory`](super::PipelineFactory): attachments of other formats than images.
+fn check_targets(pipeline: &GraphicsPipeline, targets: &[Target<'_>]) {
+    let PipelineKind::Graphics(state) = &pipeline.desc().kind else {
+        panic!("{}: described as compute, drawn as graphics", pipeline.desc().program.name)
+    };
+    let (described, given): (Vec<_>, Vec<_>) =
+        (state.attachments.iter().map(|a| a.format).collect(), targets.iter().map(|t| t.image.format()).collect());
+    assert!(
+        described == given,
+        "pipeline {} is described for attachments {described:?} but drawn into {given:?}",
+        pipeline.desc().program.name
+    );
 }
 
 /// Every stage, every access: for the rare layout changes, which happen once in an image's life or at the border to a host.
