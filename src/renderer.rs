@@ -276,7 +276,7 @@ impl Renderer {
         let (frame_buffer, model) = (&self.frame[slot], self.params.sky.model);
         self.atmosphere.record_luts(rec, frame_buffer, self.params.clouds.altitude)?;
         if model == SkyModel::Atmosphere {
-            self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera)?;
+            self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera, self.params.clouds.xi)?;
         }
         let (atmosphere, background) = (&self.atmosphere, &self.background);
         background.record_opaque(rec, atmosphere, frame_buffer)?;

@@ -1,7 +1,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Sun's transmittance of the clouds for points of the ground around the camera, by walking their light tiles' lists
-// (Yusov 5.3). Cost: one list a texel.
+// Share of the sunlight that comes down through the clouds to points of the ground around the camera, by walking their
+// light tiles' lists (Yusov 5.3). Cost: one list a texel.
+//
+// Most light under a thick cloud has been scattered on its way, so the shadow is not exp(-tau) but the two-stream
+// transmittance of a conservative layer, 1 / (1 + 3/4 (1 - g) tau) (Bohren, "Multiple scattering of light and some of its
+// observable consequences", 1987): an overcast day is grey, not black.
 #include "atmosphere/shadow_map.glsl"
 #include "tiling/tile.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -13,7 +17,7 @@ layout(binding = 4, r16f) writeonly restrict uniform image2D cloud_shadow;
 layout(push_constant) uniform CloudShadowPush {
     vec2 centre;  // of the map, relative to the floating origin [m]
     float extent; // half its side [m]
-    float reserved;
+    float diffusion; // 3/4 (1 - g) / ξ: the lists hold optical depths scaled by ξ
 } push;
 #include "lighting/sun_optical_depth.glsl"
 
@@ -23,5 +27,5 @@ void main() {
     vec2 offset = offset_from_shadow_map(2.0 * (vec2(texel) + 0.5) / vec2(size) - 1.0, push.extent);
     float drop = dot(offset, offset) * params.tiling.inverse_diameter; // the planet falls away
     vec2 p = push.centre + offset;
-    imageStore(cloud_shadow, texel, vec4(exp(-sun_optical_depth(vec3(p.x, -drop, p.y)))));
+    imageStore(cloud_shadow, texel, vec4(1.0 / (1.0 + push.diffusion * sun_optical_depth(vec3(p.x, -drop, p.y)))));
 }

@@ -37,7 +37,7 @@ Ball column_ball(CellPlace place, CellShape shape, uint layer, in GridParams p) 
     // Narrow tops, wide bottoms; small at the outline, and a few much larger than the others: billows of many sizes.
     // Neighbours overlap deeply, or the detail noise would open gaps between them.
     float taper = 1.0 - 0.42 * up * up;
-    float outline = 0.45 + 0.55 * shape.body;
+    float outline = 0.62 + 0.38 * shape.body;
     float rare = float(h0 & 255u) / 256.0;
     float size = 0.64 + 0.4 * unit_float(h0) + 0.6 * rare * rare;
     ball.across = edge * 1.2 * taper * outline * size;

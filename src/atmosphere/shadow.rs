@@ -14,16 +14,19 @@ pub const SHADOW_EXTENT: f32 = 80e3;
 
 const SIZE: u32 = 384;
 
+/// Asymmetry of cloud droplets for light scattered many times (Bohren 1987).
+const ASYMMETRY: f32 = 0.85;
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
     centre: [f32; 2],
     extent: f32,
-    reserved: f32,
+    diffusion: f32,
 }
-assert_layout!(Push, cloud_shadow_push, { centre: CENTRE, extent: EXTENT, reserved: RESERVED });
+assert_layout!(Push, cloud_shadow_push, { centre: CENTRE, extent: EXTENT, diffusion: DIFFUSION });
 
-/// A map of the sun's transmittance of the clouds on the ground, texels growing with distance from the camera
+/// A map of the share of sunlight that the clouds let through to the ground, texels growing with distance from the camera
 /// (`glsl/atmosphere/shadow_map.glsl`).
 pub struct CloudShadow {
     pipeline: ComputePipeline,
@@ -52,13 +55,15 @@ impl CloudShadow {
         })
     }
 
-    /// Walks the light tiles of this frame, `camera` being relative to the floating origin.
+    /// Walks the light tiles of this frame, `camera` being relative to the floating origin. `xi` is the factor by which the
+    /// tiles' optical depths are scaled.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,
         tiling: &Tiling,
         particles: &Buffer,
         camera: [f32; 3],
+        xi: f32,
     ) -> Result<()> {
         (self.centre, self.extent) = ([camera[0], camera[2]], SHADOW_EXTENT);
         let bindings = shader::Bindings {
@@ -68,7 +73,8 @@ impl CloudShadow {
             tile_nodes: tiling.nodes(),
             cloud_shadow: &self.image,
         };
-        let push = Push { centre: self.centre, extent: self.extent, reserved: 0.0 };
+        let push =
+            Push { centre: self.centre, extent: self.extent, diffusion: 0.75 * (1.0 - ASYMMETRY) / xi.max(1e-3) };
         rec.pass("cloud shadow", |rec| rec.dispatch(&self.pipeline, &bindings, &push, [SIZE, SIZE, 1]))
     }
 

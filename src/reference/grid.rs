@@ -196,7 +196,7 @@ fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams)
 
     let rare = (h[0] & 255) as f32 / 256.0;
     let size = 0.64 + 0.4 * unit_float(h[0]) + 0.6 * rare * rare;
-    let across = edge * 1.2 * (1.0 - 0.42 * up * up) * (0.45 + 0.55 * shape.body) * size;
+    let across = edge * 1.2 * (1.0 - 0.42 * up * up) * (0.62 + 0.38 * shape.body) * size;
     let tall = (0.62 * step).max(0.8 * across) * (0.9 + 0.25 * unit_float(h[1]));
     let tall = if layer == 0 { tall.min(0.8 * step) } else { tall };
 
