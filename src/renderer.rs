@@ -274,13 +274,17 @@ impl Renderer {
         };
         rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid))?;
         let (frame_buffer, model) = (&self.frame[slot], self.params.sky.model);
-        self.atmosphere.record_luts(rec, frame_buffer, self.params.clouds.altitude)?;
+        let cloud_base = match &self.particles {
+            Particles::Grid(..) => self.params.clouds.altitude,
+            Particles::List(list) => list.bounds()[0][1] as f32,
+        };
+        self.atmosphere.record_luts(rec, frame_buffer, cloud_base)?;
         if model == SkyModel::Atmosphere {
             self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera, self.params.clouds.xi)?;
         }
         let (atmosphere, background) = (&self.atmosphere, &self.background);
         background.record_opaque(rec, atmosphere, frame_buffer)?;
-        background.record(rec, atmosphere, frame_buffer, &self.shadow)?;
+        background.record(rec, atmosphere, frame_buffer, &self.shadow, cloud_base)?;
         if let Some(lent) = &inputs.opaque_distance {
             background.record_lent(rec, lent.image)?;
         }
@@ -299,7 +303,7 @@ impl Renderer {
             draw_args_offset: Compact::DRAW_ARGS,
         };
         self.blender.record(rec, &blend_inputs, &self.targets)?;
-        let cloud = background.record_cloud_air(rec, atmosphere, frame_buffer, &self.targets)?;
+        let cloud = background.record_cloud_air(rec, atmosphere, frame_buffer, &self.targets, cloud_base)?;
         let film = &self.film;
         film.record_composite(rec, cloud, &background.low_opaque, &background.opaque_distance, &background.radiance)?;
         film.record_tonemap(rec, &self.params.film, model)?;

@@ -208,7 +208,7 @@ fn sky_and_ground_distance_follow_the_oracle() {
             .frames()
             .run(|rec| {
                 background.record_opaque(rec, atmosphere, frame)?;
-                background.record(rec, atmosphere, frame, &shadow)
+                background.record(rec, atmosphere, frame, &shadow, 1500.0)
             })
             .unwrap();
         let air = Air::default();
@@ -272,6 +272,7 @@ fn the_air_in_front_of_clouds_follows_the_oracle() {
     let oracle = AirTables::new(air, size2(&s.atmosphere.transmittance), size2(&s.atmosphere.multiple));
     let background = Background::new(&gpu, SkyModel::Atmosphere, EXTENT, 1, Precision::F32).unwrap();
     let targets = CloudTargets::new(&gpu, EXTENT, Precision::F32).unwrap();
+    let no_shadow = CloudShadow::new(&gpu).unwrap();
     let (cloud, transmittance) = (DVec3::new(0.4, 0.5, 0.6), 0.25);
     for distance in [10.0f32, 800.0, 5e3, 33e3, 110e3] {
         let (atmosphere, frame) = (&s.atmosphere, &s.frame);
@@ -281,7 +282,8 @@ fn the_air_in_front_of_clouds_follows_the_oracle() {
             .run(|rec| {
                 rec.clear_image(&targets.cloud, [0.4, 0.5, 0.6, transmittance]);
                 rec.clear_image(&targets.nearest, [distance; 4]);
-                image = Some(background.record_cloud_air(rec, atmosphere, frame, &targets)?);
+                background.record(rec, atmosphere, frame, &no_shadow, 1500.0)?;
+                image = Some(background.record_cloud_air(rec, atmosphere, frame, &targets, 1500.0)?);
                 Ok(())
             })
             .unwrap();
@@ -309,6 +311,58 @@ fn the_air_in_front_of_clouds_follows_the_oracle() {
 }
 
 #[test]
+fn shadow_takes_the_sunlit_air_below_the_clouds_away() {
+    let mut s = Setup::new(SkyModel::Atmosphere, 600.0, 12.0, 15.0);
+    let base = 1500.0f32;
+    s.fill(base);
+    let gpu = s.device.gpu().clone();
+    let air = Air::default();
+    let oracle = AirTables::new(air, size2(&s.atmosphere.transmittance), size2(&s.atmosphere.multiple));
+    let background = Background::new(&gpu, SkyModel::Atmosphere, EXTENT, 1, Precision::F32).unwrap();
+    let mut shadow = CloudShadow::new(&gpu).unwrap();
+    let mut pictures = Vec::new();
+    for transmittance in [1.0, 0.0] {
+        let (atmosphere, frame, camera) = (&s.atmosphere, &s.frame, s.params.camera);
+        s.device
+            .frames()
+            .run(|rec| {
+                shadow.record_uniform(rec, transmittance, camera);
+                background.record_opaque(rec, atmosphere, frame)?;
+                background.record(rec, atmosphere, frame, &shadow, base)
+            })
+            .unwrap();
+        pictures.push(floats(&mut s.device, &background.radiance, 4));
+    }
+    let (mut checked, through) = (0, 0.23); // CLOUD_DIFFUSE_TRANSMITTANCE
+    for (x, y) in [(3, 2), (40, 10), (47, 20), (80, 5), (90, 25)] {
+        let view = s.view(x, y);
+        let nu = s.nu(view);
+        assert!(view.y > 0.02, "a ray that leaves the shadow through the base of the clouds");
+        // Where the ray reaches the base: the farther root of a sphere around the planet's centre.
+        let (r, r_base) = (air.bottom_radius + s.altitude, air.bottom_radius + f64::from(base));
+        let length = -r * view.y + (r_base * r_base - r * r * (1.0 - view.y * view.y)).sqrt();
+        if length > 40e3 {
+            continue; // the map ends
+        }
+        let mut light = welkin::reference::atmosphere::Airlight::default();
+        for k in 0..800 {
+            let part = |k: i32| length * f64::from(k) / 800.0;
+            oracle.step(s.altitude, view.y, s.mu_s, nu, part(k), part(k + 1), &mut light);
+        }
+        let lost = light.smooth_part * (0.5 * (1.0 - through))
+            + light.aerosol * (mie_phase(nu, air.mie_g) - through / (4.0 * PI)).max(0.0);
+        let i = 4 * (y * EXTENT[0] + x) as usize;
+        let at = |picture: &[f32]| DVec3::new(picture[i].into(), picture[i + 1].into(), picture[i + 2].into());
+        let got = at(&pictures[0]) - at(&pictures[1]);
+        // Interpolation in 64 × 192 texels, near the horizon in rays whose length changes quickly.
+        close(got, lost * DVec3::from_array(air.solar_irradiance), 0.05, 1e-3, &format!("loss at ({x}, {y})"));
+        checked += 1;
+    }
+    assert!(checked >= 3);
+    s.silent();
+}
+
+#[test]
 fn without_a_sky_all_is_black_and_clouds_are_untouched() {
     let mut s = Setup::new(SkyModel::None, 600.0, -12.0, 15.0);
     s.fill(2000.0);
@@ -322,8 +376,8 @@ fn without_a_sky_all_is_black_and_clouds_are_untouched() {
         .frames()
         .run(|rec| {
             background.record_opaque(rec, atmosphere, frame)?;
-            background.record(rec, atmosphere, frame, &shadow)?;
-            let cloud = background.record_cloud_air(rec, atmosphere, frame, &targets)?;
+            background.record(rec, atmosphere, frame, &shadow, 1500.0)?;
+            let cloud = background.record_cloud_air(rec, atmosphere, frame, &targets, 1500.0)?;
             assert!(std::ptr::eq(cloud, &targets.cloud));
             rec.copy_buffer(atmosphere.sky_light(), &readback, size_of::<SkyLight>() as u64);
             rec.make_visible_to_host(&readback);

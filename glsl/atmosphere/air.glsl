@@ -53,6 +53,25 @@ float mu_along(AirParams air, float h, float mu_other, float nu, float h_d, floa
     return clamp(((air.bottom_radius + h) * mu_other + d * nu) / (air.bottom_radius + h_d), -1.0, 1.0);
 }
 
+// Where a ray runs below altitude `base`, before it meets the ground: from x to y [m]; y <= x if nowhere.
+vec2 stretch_below(AirParams air, float h, float mu, float base) {
+    float r = air.bottom_radius + h;
+    float b = -r * mu;
+    float gap = (base - h) * (2.0 * air.bottom_radius + base + h); // R_base² − r²
+    vec2 stretch;
+    if (gap >= 0.0) {
+        float root = sqrt(b * b + gap);
+        stretch = vec2(0.0, b > 0.0 ? b + root : gap / max(root - b, 1e-3));
+    } else {
+        float square = b * b + gap;
+        if (b <= 0.0 || square <= 0.0) return vec2(0.0);
+        float root = sqrt(square);
+        stretch = vec2(-gap / (b + root), b + root);
+    }
+    if (hits_ground(air, h, mu)) stretch.y = min(stretch.y, distance_to_ground(air, h, mu));
+    return stretch;
+}
+
 // --- medium ---------------------------------------------------------------------------------------------------------
 
 struct AirSample {

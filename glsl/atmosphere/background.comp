@@ -1,9 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // What is behind the clouds, at full resolution: sky, sun and ground with the air in front of them. Linear radiance.
-#include "atmosphere/ground.glsl"
-#include "atmosphere/shadow_map.glsl"
-#include "atmosphere/sky.glsl"
+#include "atmosphere/shafts.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, std430) restrict readonly buffer Air { AirParams params; } air;
 layout(binding = 1, std430) restrict readonly buffer Frame { FrameParams params; } frame;
@@ -12,7 +10,10 @@ layout(binding = 3) uniform sampler2D transmittance_lut;
 layout(binding = 4) uniform sampler2D sky_view_smooth;
 layout(binding = 5) uniform sampler2D sky_view_aerosol;
 layout(binding = 6) uniform sampler2D cloud_shadow; // sun's transmittance of the clouds on the ground
-layout(binding = 7) restrict writeonly uniform image2D radiance;
+layout(binding = 7) uniform sampler2D below_smooth_table;
+layout(binding = 8) uniform sampler2D below_aerosol_table;
+layout(binding = 9) uniform sampler2D visibility;    // low resolution, of the sun along the ray below the clouds
+layout(binding = 10) restrict writeonly uniform image2D radiance;
 layout(push_constant) uniform BackgroundPush {
     vec2 shadow_centre;  // of the shadow map's square, relative to the floating origin [m]
     float shadow_extent; // half its side [m]; 0: no shadows
@@ -75,5 +76,9 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy), size = imageSize(radiance);
     if (any(greaterThanEqual(pixel, size))) return;
     vec3 view = view_ray(frame.params, vec2(pixel) + 0.5, vec2(size));
-    imageStore(radiance, pixel, vec4(background(view), 1.0));
+    vec3 light = background(view);
+    float seen = shaft_visibility_at(visibility, (vec2(pixel) + 0.5) / vec2(size));
+    light -= shaft_loss(below_smooth_table, below_aerosol_table, air.params, camera_altitude(air.params, frame.params),
+                        view, frame.params.to_sun, seen);
+    imageStore(radiance, pixel, vec4(max(light, 0.0), 1.0));
 }

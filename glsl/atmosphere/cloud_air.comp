@@ -4,7 +4,7 @@
 // first cloud and gets the airlight of that stretch for the part of the pixel that the cloud covers,
 //   L' = L · T_air(d) + (1 − T) · S(d).
 // Done before upsampling, because L' and T may be interpolated across the edge of a cloud, but its distance may not.
-#include "atmosphere/sky.glsl"
+#include "atmosphere/shafts.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, std430) restrict readonly buffer Air { AirParams params; } air;
 layout(binding = 1, std430) restrict readonly buffer Frame { FrameParams params; } frame;
@@ -13,8 +13,12 @@ layout(binding = 3) uniform sampler3D aerosol_table;
 layout(binding = 4) uniform sampler2D extinction_table;
 layout(binding = 5) uniform sampler2D cloud;   // radiance, transmittance
 layout(binding = 6) uniform sampler2D nearest; // distance to the first cloud [m]
-layout(binding = 7) restrict writeonly uniform image2D cloud_in_air;
+layout(binding = 7) uniform sampler2D visibility; // of the sun along the ray below the clouds
+layout(binding = 8) uniform sampler2D below_smooth_table;
+layout(binding = 9) uniform sampler2D below_aerosol_table;
+layout(binding = 10) restrict writeonly uniform image2D cloud_in_air;
 layout(push_constant) uniform CloudAirPush {
+    float cloud_base; // altitude [m]
     uint downscale;
 } push;
 
@@ -28,6 +32,15 @@ void main() {
         vec3 view = view_ray(frame.params, (vec2(texel) + 0.5) * float(push.downscale), size);
         AerialPerspective aerial = aerial_perspective(smooth_table, aerosol_table, extinction_table, air.params, distance,
                                                       view, frame.params.to_sun);
+        float seen = shaft_visibility_at(visibility, (vec2(texel) + 0.5) / vec2(textureSize(visibility, 0)));
+        float h = camera_altitude(air.params, frame.params);
+        vec2 stretch = stretch_below(air.params, h, view.y, push.cloud_base);
+        if (stretch.y > stretch.x) {
+            // Clouds begin at their base, where the stretch ends; one that hangs lower hides the rest of it.
+            float part = clamp((distance - stretch.x) / (stretch.y - stretch.x), 0.0, 1.0);
+            aerial.inscatter -= part * shaft_loss(below_smooth_table, below_aerosol_table, air.params, h, view,
+                                                  frame.params.to_sun, seen);
+        }
         layer.rgb = layer.rgb * aerial.transmittance + (1.0 - layer.a) * aerial.inscatter;
     }
     imageStore(cloud_in_air, texel, layer);

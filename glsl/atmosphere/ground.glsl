@@ -85,7 +85,7 @@ vec3 field_at(vec2 p) {
 vec3 ground_albedo(vec3 mean_albedo, vec2 p, float footprint) {
     const vec3 wood = vec3(0.42, 0.52, 0.48);
     const vec3 field_mean = vec3(1.19, 1.14, 1.10);
-    float land = ground_fbm(p, 16384.0, 5, footprint, 11u); // where woods are
+    float land = ground_fbm(p, 16384.0, 4, footprint, 11u); // where woods are
     vec3 relative = field_mean;
     float keep = resolved(0.7 * FIELD_SIZE, footprint);
     if (keep > 0.0) {
@@ -94,16 +94,21 @@ vec3 ground_albedo(vec3 mean_albedo, vec2 p, float footprint) {
         vec3 crop = mix(vec3(0.82, 0.92, 0.78), vec3(1.18, 1.22, 1.02), field.x);      // green crop and meadow
         vec3 straw = mix(vec3(1.75, 1.45, 1.50), vec3(1.35, 1.08, 1.35), field.x);     // ripe grain and bare soil
         vec3 colour = mix(crop, straw, smoothstep(0.55, 0.75, field.y));
-        colour *= 0.4 + 1.2 * ground_fbm(p, 256.0, 9, footprint, 31u); // unevenness down to tufts
-        float ragged = 8.0 * ground_fbm(p, 32.0, 4, footprint, 51u);
-        float hedge = (1.0 - smoothstep(2.0, 9.0, field.z - ragged + 4.0)) * resolved(24.0, footprint);
-        colour = mix(colour, wood * (0.6 + 0.8 * ground_fbm(p, 16.0, 4, footprint, 61u)), 0.85 * hedge);
+        colour *= 0.4 + 1.2 * ground_fbm(p, 128.0, 4, footprint, 31u); // unevenness
+        float hedge = resolved(24.0, footprint);
+        if (hedge > 0.0 && field.z < 20.0) {
+            float ragged = 8.0 * ground_fbm(p, 32.0, 2, footprint, 51u);
+            hedge *= 1.0 - smoothstep(2.0, 9.0, field.z - ragged + 4.0);
+            colour = mix(colour, wood * (0.6 + 0.8 * ground_fbm(p, 16.0, 3, footprint, 61u)), 0.85 * hedge);
+        }
         relative = mix(relative, colour, keep);
     }
     float wooded = smoothstep(0.53, 0.53 + mix(0.015, 0.10, smoothstep(20.0, 2000.0, footprint)), land);
-    float crowns = 0.8 + 0.4 * ground_fbm(p, 128.0, 3, footprint, 41u);
-    relative = mix(relative, wood * crowns, wooded);
-    return mean_albedo * relative * (0.85 + 0.3 * ground_fbm(p, 32768.0, 3, footprint, 21u));
+    if (wooded > 0.0) {
+        float crowns = 0.8 + 0.4 * ground_fbm(p, 128.0, 3, footprint, 41u);
+        relative = mix(relative, wood * crowns, wooded);
+    }
+    return mean_albedo * relative * (0.85 + 0.3 * ground_fbm(p, 32768.0, 1, footprint, 21u));
 }
 
 // Part of the sunlight on a cumulus that leaves its base again, diffusely: two-stream, 1/(1 + 3/4 τ(1 − g)) for τ = 30,

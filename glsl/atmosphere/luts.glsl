@@ -155,6 +155,40 @@ Airlight compute_airlight(sampler2D transmittance, sampler2D multiple, AirParams
     return light;
 }
 
+// Airlight of the stretch from x to y of a ray, as it arrives at the eye.
+Airlight airlight_between(sampler2D transmittance, sampler2D multiple, AirParams air, float h, float mu, float mu_s,
+                          float nu, vec2 stretch, int steps) {
+    Airlight before = Airlight(vec3(0.0), vec3(0.0), vec3(0.0));
+    if (stretch.y <= stretch.x) return before;
+    float begin = 0.0;
+    if (stretch.x > 0.0) {
+        for (int i = 1; i <= steps / 2; ++i) {
+            float end = stretch.x * float(i) / float(steps / 2);
+            step_airlight(transmittance, multiple, air, h, mu, mu_s, nu, begin, end, before);
+            begin = end;
+        }
+    }
+    Airlight after = before;
+    for (int i = 1; i <= steps; ++i) {
+        float s = float(i) / float(steps);
+        float end = stretch.x + (stretch.y - stretch.x) * s * s;
+        step_airlight(transmittance, multiple, air, h, mu, mu_s, nu, begin, end, after);
+        begin = end;
+    }
+    return Airlight(after.smooth_part - before.smooth_part, after.aerosol - before.aerosol,
+                    after.optical_depth - before.optical_depth);
+}
+
+// The part of a sky-view value that comes from below altitude `base`.
+Airlight sky_view_below(sampler2D transmittance, sampler2D multiple, AirParams air, float h, float mu_s, float base,
+                        ivec2 texel, ivec2 size) {
+    bool ground = texel.y < size.y / 2;
+    vec2 direction = direction_from_sky_view(air, h, sky_view_texel(texel, size), ground);
+    float nu = nu_from_azimuth(direction.x, mu_s, direction.y);
+    vec2 stretch = stretch_below(air, h, direction.x, base);
+    return airlight_between(transmittance, multiple, air, h, direction.x, mu_s, nu, stretch, SKY_VIEW_STEPS);
+}
+
 Airlight sky_view_value(sampler2D transmittance, sampler2D multiple, AirParams air, float h, float mu_s, ivec2 texel,
                         ivec2 size) {
     bool ground = texel.y < size.y / 2;

@@ -34,6 +34,21 @@ vec3 sky_radiance(sampler2D smooth_table, sampler2D aerosol_table, AirParams air
                              textureLod(aerosol_table, texture_uv, 0.0).rgb, dot(view, to_sun));
 }
 
+// Airlight between the eye and a distance, as its two parts per unit of solar irradiance.
+struct AerialParts {
+    vec3 smooth_part; // [1/sr]
+    vec3 aerosol;     // without its phase function [1]
+};
+
+AerialParts aerial_parts(sampler3D smooth_table, sampler3D aerosol_table, float distance, vec3 view, vec3 to_sun) {
+    float d = clamp(distance, 0.0, AERIAL_DISTANCE_MAX);
+    vec3 u = aerial_from_ray(view.y, azimuth_from_sun(view, to_sun), d, AERIAL_DISTANCE_MAX);
+    ivec3 size = textureSize(smooth_table, 0);
+    u = vec3(to_texture(u.x, size.x), to_texture(u.y, size.y), to_texture(u.z, size.z));
+    float km = 1e-3 * d; // the tables hold means per kilometre
+    return AerialParts(km * textureLod(smooth_table, u, 0.0).rgb, km * textureLod(aerosol_table, u, 0.0).rgb);
+}
+
 struct AerialPerspective {
     vec3 inscatter;     // airlight between the eye and the distance
     vec3 transmittance; // of the air in between
@@ -42,14 +57,13 @@ struct AerialPerspective {
 AerialPerspective aerial_perspective(sampler3D smooth_table, sampler3D aerosol_table, sampler2D extinction_table,
                                      AirParams air, float distance, vec3 view, vec3 to_sun) {
     float d = min(distance, AERIAL_DISTANCE_MAX);
-    vec3 u = aerial_from_ray(view.y, azimuth_from_sun(view, to_sun), d, AERIAL_DISTANCE_MAX);
-    ivec3 size = textureSize(smooth_table, 0);
-    u = vec3(to_texture(u.x, size.x), to_texture(u.y, size.y), to_texture(u.z, size.z));
-    float km = 1e-3 * d; // the tables hold means per kilometre
+    AerialParts parts = aerial_parts(smooth_table, aerosol_table, d, view, to_sun);
     AerialPerspective aerial;
-    aerial.inscatter = km * airlight_radiance(air, textureLod(smooth_table, u, 0.0).rgb,
-                                              textureLod(aerosol_table, u, 0.0).rgb, dot(view, to_sun));
-    aerial.transmittance = exp(-km * textureLod(extinction_table, u.yz, 0.0).rgb);
+    aerial.inscatter = airlight_radiance(air, parts.smooth_part, parts.aerosol, dot(view, to_sun));
+    vec2 u = aerial_from_ray(view.y, 0.0, d, AERIAL_DISTANCE_MAX).yz;
+    ivec2 size = textureSize(extinction_table, 0);
+    u = vec2(to_texture(u.x, size.x), to_texture(u.y, size.y));
+    aerial.transmittance = exp(-1e-3 * d * textureLod(extinction_table, u, 0.0).rgb); // mean per kilometre
     return aerial;
 }
 

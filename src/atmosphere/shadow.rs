@@ -78,6 +78,12 @@ impl CloudShadow {
         rec.pass("cloud shadow", |rec| rec.dispatch(&self.pipeline, &bindings, &push, [SIZE, SIZE, 1]))
     }
 
+    /// One transmittance everywhere around `camera`: a closed deck, or a host without light tiles.
+    pub fn record_uniform(&mut self, rec: &mut Recorder<'_>, transmittance: f32, camera: [f32; 3]) {
+        (self.centre, self.extent) = ([camera[0], camera[2]], SHADOW_EXTENT);
+        rec.clear_image(&self.image, [transmittance; 4]);
+    }
+
     /// Where the map lies: its centre relative to the floating origin, and half its side (0: nothing recorded) \[m\].
     #[must_use]
     pub fn place(&self) -> ([f32; 2], f32) {

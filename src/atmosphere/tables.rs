@@ -39,6 +39,10 @@ pub struct Atmosphere {
     pub sky_view_smooth: Image,
     /// Airlight along whole rays: aerosol, without its phase function.
     pub sky_view_aerosol: Image,
+    /// What of [`Self::sky_view_smooth`] comes from below the clouds.
+    pub below_smooth: Image,
+    /// What of [`Self::sky_view_aerosol`] comes from below the clouds.
+    pub below_aerosol: Image,
     /// Mean in-scattering up to a distance: Rayleigh and multiple scattering.
     pub aerial_smooth: Image,
     /// Mean in-scattering up to a distance: aerosol, without its phase function.
@@ -75,6 +79,8 @@ impl Atmosphere {
             multiple: table(gpu, "air multiple scattering", flat(MULTIPLE_SIZE))?,
             sky_view_smooth: table(gpu, "sky view, smooth", flat(SKY_VIEW_SIZE))?,
             sky_view_aerosol: table(gpu, "sky view, aerosol", flat(SKY_VIEW_SIZE))?,
+            below_smooth: table(gpu, "sky view below clouds, smooth", flat(SKY_VIEW_SIZE))?,
+            below_aerosol: table(gpu, "sky view below clouds, aerosol", flat(SKY_VIEW_SIZE))?,
             aerial_smooth: table(gpu, "aerial perspective, smooth", AERIAL_SIZE)?,
             aerial_aerosol: table(gpu, "aerial perspective, aerosol", AERIAL_SIZE)?,
             aerial_extinction: table(gpu, "aerial extinction", flat([AERIAL_SIZE[1], AERIAL_SIZE[2]]))?,
@@ -94,9 +100,9 @@ impl Atmosphere {
     }
 
     /// Fills what depends on the frame (and once what does not): sky view, aerial perspective, light on clouds and
-    /// ground. `frame` holds [`FrameParams`](crate::shared::FrameParams), `cloud_altitude` is where the clouds' light is
-    /// taken \[m\]. With no sky only the light is written.
-    pub fn record_luts(&mut self, rec: &mut Recorder<'_>, frame: &Buffer, cloud_altitude: f32) -> Result<()> {
+    /// ground. `frame` holds [`FrameParams`](crate::shared::FrameParams), `cloud_base` is the lowest altitude
+    /// of the clouds, where their light is taken \[m\]. With no sky only the light is written.
+    pub fn record_luts(&mut self, rec: &mut Recorder<'_>, frame: &Buffer, cloud_base: f32) -> Result<()> {
         let linear = |image| Image::sampled(image, Sampler::LinearClamp);
         rec.pass("atmosphere", |rec| {
             if self.model == SkyModel::Atmosphere {
@@ -120,8 +126,10 @@ impl Atmosphere {
                     multiple_lut: linear(&self.multiple),
                     smooth_table: &self.sky_view_smooth,
                     aerosol_table: &self.sky_view_aerosol,
+                    below_smooth_table: &self.below_smooth,
+                    below_aerosol_table: &self.below_aerosol,
                 };
-                rec.dispatch(&self.fill_sky_view, &bindings, &(), [SKY_VIEW_SIZE[0], SKY_VIEW_SIZE[1], 1])?;
+                rec.dispatch(&self.fill_sky_view, &bindings, &cloud_base, [SKY_VIEW_SIZE[0], SKY_VIEW_SIZE[1], 1])?;
                 let bindings = aerial::Bindings {
                     air: &self.air,
                     frame,
@@ -140,7 +148,7 @@ impl Atmosphere {
                 multiple_lut: linear(&self.multiple),
                 sky_light: &self.sky_light,
             };
-            rec.dispatch(&self.fill_sky_light, &bindings, &cloud_altitude, [1, 1, 1])
+            rec.dispatch(&self.fill_sky_light, &bindings, &cloud_base, [1, 1, 1])
         })
     }
 }
