@@ -64,7 +64,21 @@ fn devices_says_why_a_mode_cannot_be_used() {
     for mode in devices.iter().flat_map(|device| device["blend"].as_array().unwrap()) {
         assert_ne!(mode["supported"].as_bool().unwrap(), mode["reason"].is_string(), "{mode}");
     }
+    assert!(report["pipelines"].is_null());
     assert!(stdout(&run(directory.path(), "devices")).contains("interlock"));
+}
+
+#[test]
+fn devices_prints_every_pipeline_of_a_frame() {
+    let directory = directory("");
+    let output = run(directory.path(), "devices --json --pipelines");
+    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let pipelines: Vec<_> = report["pipelines"].as_array().unwrap().iter().map(|p| p.as_str().unwrap()).collect();
+    for stage in ["grid/", "compact/", "tiling/", "lighting/", "detail/", "atmosphere/", "blend/", "film/"] {
+        assert!(pipelines.iter().any(|pipeline| pipeline.starts_with(stage)), "{stage}: {pipelines:?}");
+    }
+    let text = stdout(&run(directory.path(), "devices --pipelines"));
+    assert!(pipelines.iter().all(|pipeline| text.contains(pipeline)), "{text}");
 }
 
 #[test]

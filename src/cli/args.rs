@@ -33,6 +33,9 @@ pub struct DevicesArgs {
     /// Print JSON (docs/json.md)
     #[arg(long)]
     pub json: bool,
+    /// Also print every pipeline of a frame as it would be built on the default device
+    #[arg(long)]
+    pub pipelines: bool,
 }
 
 /// What picture, on what device: shared by the commands that render.

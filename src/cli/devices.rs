@@ -4,14 +4,19 @@ use std::fmt::Write;
 
 use serde::Serialize;
 use welkin::Result;
-use welkin::gpu::{Capabilities, Feature, standalone};
-use welkin::params::{BLENDS, Blend};
+use welkin::frame::{Output, OutputKind};
+use welkin::gpu::standalone::{self, Options, Standalone};
+use welkin::gpu::{Capabilities, Feature};
+use welkin::params::{BLENDS, Blend, Params};
+use welkin::renderer::Renderer;
 
 use super::args::DevicesArgs;
 
 #[derive(Serialize)]
 struct Report {
     devices: Vec<Device>,
+    /// Descriptions, if asked for.
+    pipelines: Option<Vec<String>>,
 }
 
 #[derive(Serialize)]
@@ -53,9 +58,19 @@ impl From<Result<(), String>> for Answer {
 
 pub fn run(args: &DevicesArgs) -> Result<()> {
     let devices = standalone::devices()?;
-    let report =
-        Report { devices: devices.iter().enumerate().map(|(index, device)| describe(index, device)).collect() };
+    let report = Report {
+        devices: devices.iter().enumerate().map(|(index, device)| describe(index, device)).collect(),
+        pipelines: if args.pipelines { Some(pipelines()?) } else { None },
+    };
     if args.json { super::print_json(&report) } else { super::print(&text(&report)) }
+}
+
+/// Every pipeline of a frame of the default scene, on the device that `render` takes by default.
+fn pipelines() -> Result<Vec<String>> {
+    let device = Standalone::new(Options::default())?;
+    let _renderer = Renderer::new(device.gpu(), &Params::default(), [64, 64], 1)?;
+    let _output = Output::new(device.gpu(), OutputKind::Picture, ash::vk::Format::B8G8R8A8_UNORM)?;
+    Ok(device.gpu().described_pipelines())
 }
 
 fn describe(index: usize, device: &Capabilities) -> Device {
@@ -105,6 +120,9 @@ fn text(report: &Report) -> String {
         }
         let _ = writeln!(text, "   {:<12} {}", "auto", device.auto.map_or("none", |mode| mode));
         let _ = writeln!(text, "   {:<12} {}", "timestamps", answer_text(&device.timestamps));
+    }
+    for pipeline in report.pipelines.iter().flatten() {
+        let _ = writeln!(text, "\n{pipeline}");
     }
     text
 }
