@@ -278,10 +278,10 @@ impl Renderer {
             Particles::Grid(..) => self.params.clouds.altitude,
             Particles::List(list) => list.bounds()[0][1] as f32,
         };
-        self.atmosphere.record_luts(rec, frame_buffer, cloud_base)?;
         if model == SkyModel::Atmosphere {
             self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera, self.params.clouds.xi)?;
         }
+        self.atmosphere.record_luts(rec, frame_buffer, &self.shadow, cloud_base)?;
         let (atmosphere, background) = (&self.atmosphere, &self.background);
         background.record_opaque(rec, atmosphere, frame_buffer)?;
         background.record(rec, atmosphere, frame_buffer, &self.shadow, cloud_base)?;

@@ -56,8 +56,13 @@ impl Setup {
     }
 
     fn fill(&mut self, cloud_altitude: f32) {
+        let no_shadow = CloudShadow::new(self.device.gpu()).unwrap();
+        self.fill_under(&no_shadow, cloud_altitude);
+    }
+
+    fn fill_under(&mut self, shadow: &CloudShadow, cloud_altitude: f32) {
         let (atmosphere, frame) = (&mut self.atmosphere, &self.frame);
-        self.device.frames().run(|rec| atmosphere.record_luts(rec, frame, cloud_altitude)).unwrap();
+        self.device.frames().run(|rec| atmosphere.record_luts(rec, frame, shadow, cloud_altitude)).unwrap();
     }
 
     fn view(&self, x: u32, y: u32) -> DVec3 {

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // What is behind the clouds, at full resolution: sky, sun and ground with the air in front of them. Linear radiance.
+#include "atmosphere/ground.glsl"
 #include "atmosphere/shafts.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, std430) restrict readonly buffer Air { AirParams params; } air;
@@ -9,7 +10,7 @@ layout(binding = 2, std430) restrict readonly buffer Light { SkyLight params; } 
 layout(binding = 3) uniform sampler2D transmittance_lut;
 layout(binding = 4) uniform sampler2D sky_view_smooth;
 layout(binding = 5) uniform sampler2D sky_view_aerosol;
-layout(binding = 6) uniform sampler2D cloud_shadow; // sun's transmittance of the clouds on the ground
+layout(binding = 6) uniform sampler2D cloud_shadow; // share of sunlight that the clouds let through to the ground
 layout(binding = 7) uniform sampler2D below_smooth_table;
 layout(binding = 8) uniform sampler2D below_aerosol_table;
 layout(binding = 9) uniform sampler2D visibility;    // low resolution, of the sun along the ray below the clouds

@@ -111,14 +111,9 @@ vec3 ground_albedo(vec3 mean_albedo, vec2 p, float footprint) {
     return mean_albedo * relative * (0.85 + 0.3 * ground_fbm(p, 32768.0, 1, footprint, 21u));
 }
 
-// Part of the sunlight on a cumulus that leaves its base again, diffusely: two-stream, 1/(1 + 3/4 τ(1 − g)) for τ = 30,
-// g = 0.85. Without it the ground in the shadow of a cloud would be lit by clear sky alone, too dark and too blue.
-const float CLOUD_DIFFUSE_TRANSMITTANCE = 0.23;
-
 // Radiance of diffuse ground under sun and sky [irradiance/sr].
 vec3 ground_radiance(vec3 albedo, vec3 sun_irradiance, float mu_s, float cloud_shadow, vec3 sky_irradiance) {
-    float sun_part = mix(CLOUD_DIFFUSE_TRANSMITTANCE, 1.0, cloud_shadow);
-    return albedo / AIR_PI * (sun_irradiance * (max(mu_s, 0.0) * sun_part) + sky_irradiance);
+    return albedo / AIR_PI * (sun_irradiance * (max(mu_s, 0.0) * cloud_shadow) + sky_irradiance);
 }
 
 #endif

@@ -4,9 +4,12 @@
 #ifndef ATMOSPHERE_SHAFTS_GLSL
 #define ATMOSPHERE_SHAFTS_GLSL
 
-#include "atmosphere/ground.glsl"
 #include "atmosphere/shadow_map.glsl"
 #include "atmosphere/sky.glsl"
+
+// Part of the sunlight on a cumulus that leaves its base again, diffusely: two-stream, 1/(1 + 3/4 τ(1 − g)) for τ = 30,
+// g = 0.85 (see cloud_shadow.comp).
+const float CLOUD_DIFFUSE_TRANSMITTANCE = 0.23;
 
 const int SHAFT_STEPS = 12; // of each texel; 16 texels share their samples
 const float SHAFT_DISTANCE_MAX = 60e3; // [m]; farther air is taken as the mean of the nearer
@@ -30,7 +33,7 @@ float shaft_visibility(sampler2D cloud_shadow, AirParams air, FrameParams frame,
         vec2 p = frame.camera.xz + t * view.xz - frame.to_sun.xz * (altitude / frame.to_sun.y) - shadow_centre;
         vec2 u = shadow_map_from_offset(p, shadow_extent);
         float inside = 1.0 - smoothstep(0.85, 1.0, max(abs(u.x), abs(u.y)));
-        float shadow = inside > 0.0 ? mix(1.0, textureLod(cloud_shadow, 0.5 + 0.5 * u, 0.0).r, inside) : 1.0;
+        float shadow = inside > 0.0 ? mix(1.0, textureLod(cloud_shadow, 0.5 + 0.5 * u, 0.0).g, inside) : 1.0;
         float weight = s * exp(-altitude / air.mie_scale_height - extinction * t); // s: length of the step
         sum += weight * shadow;
         weights += weight;

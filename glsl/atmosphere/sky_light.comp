@@ -1,19 +1,25 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Light of sun, sky and ground on clouds and ground, at one altitude each. One group; 256 directions, 24 steps each,
-// three times. The sums are trees over a fixed order, so the result does not depend on scheduling.
+// three times. Ground and sky over it lie under clouds: both are dimmed by what the clouds let through on the mean of some
+// 25 km around the camera, or the undersides of an overcast deck would be lit by sunny meadows. The sums are trees over a fixed order, so the result does not depend on scheduling.
 #include "atmosphere/sky.glsl"
 const int DIRECTIONS = 256;
 const int STEPS = 24;
+// Irradiance from diffusing clouds as part of the sun's on level ground: the two-stream transmittance
+// 1/(1 + 3/4 τ(1 − g)) of a layer with τ = 30, g = 0.85.
+const float CLOUD_GLOW = 0.23;
 layout(local_size_x = DIRECTIONS) in;
 layout(constant_id = 0) const uint SKY_MODEL = 1; // 0: no sky, the sun shines undimmed; 1: this atmosphere
 layout(binding = 0, std430) restrict readonly buffer Air { AirParams params; } air;
 layout(binding = 1, std430) restrict readonly buffer Frame { FrameParams params; } frame;
 layout(binding = 2) uniform sampler2D transmittance_lut;
 layout(binding = 3) uniform sampler2D multiple_lut;
+layout(binding = 5) uniform sampler2D cloud_shadow;
 layout(binding = 4, std430) restrict writeonly buffer Light { SkyLight params; } sky_light;
 layout(push_constant) uniform SkyLightPush {
     float cloud_altitude; // [m]
+    uint shadowed;        // 0: there is no shadow map
 } push;
 
 shared vec3 partial[DIRECTIONS];
@@ -39,6 +45,20 @@ vec3 horizontal_irradiance(float h, float mu_s, bool up, vec3 ground) {
     return partial[0] * (AIR_PI / float(DIRECTIONS));
 }
 
+// Mean share of sunlight that the clouds let through to the ground: 16 × 16 places of the inner part of the map.
+float mean_cloud_transmittance() {
+    int i = int(gl_LocalInvocationIndex);
+    vec2 u = (vec2(i & 15, i >> 4) + 0.5) / 8.0 - 1.0;
+    barrier();
+    partial[i] = push.shadowed == 0u ? vec3(1.0) : textureLod(cloud_shadow, 0.5 + 0.2 * u, 0.0).rrr;
+    for (int width = DIRECTIONS / 2; width > 0; width /= 2) {
+        barrier();
+        if (i < width) partial[i] += partial[i + width];
+    }
+    barrier();
+    return partial[0].r / float(DIRECTIONS);
+}
+
 void main() {
     SkyLight light;
     light.reserved_a = light.reserved_b = light.reserved_c = light.reserved_d = light.reserved_e = 0.0;
@@ -50,11 +70,16 @@ void main() {
         float mu_s = frame.params.to_sun.y;
         float h = clamp(push.cloud_altitude, 1.0, air.params.top_height - 1.0);
         vec3 sun_ground = transmittance_to_sun(transmittance_lut, air.params, 0.0, mu_s);
-        vec3 sky_ground = horizontal_irradiance(0.0, mu_s, true, vec3(0.0));
-        vec3 ground = air.params.ground_albedo / AIR_PI * (sun_ground * max(mu_s, 0.0) + sky_ground);
-        light.sun_irradiance_clouds = solar * transmittance_to_sun(transmittance_lut, air.params, h, mu_s);
-        light.sky_irradiance_clouds = solar * horizontal_irradiance(h, mu_s, true, vec3(0.0));
+        float under_clouds = mean_cloud_transmittance();
+        vec3 sky_ground = under_clouds * horizontal_irradiance(0.0, mu_s, true, vec3(0.0));
+        vec3 ground = air.params.ground_albedo / AIR_PI * (sun_ground * (under_clouds * max(mu_s, 0.0)) + sky_ground);
+        // Where a cloud does not see the sky it sees other clouds, which glow white with the sunlight they diffuse.
+        vec3 sun_clouds = transmittance_to_sun(transmittance_lut, air.params, h, mu_s);
+        vec3 from_clouds = sun_clouds * (CLOUD_GLOW * max(mu_s, 0.0));
+        light.sky_irradiance_clouds =
+            solar * mix(from_clouds, horizontal_irradiance(h, mu_s, true, vec3(0.0)), under_clouds);
         light.ground_irradiance_clouds = solar * horizontal_irradiance(h, mu_s, false, ground);
+        light.sun_irradiance_clouds = solar * sun_clouds;
         light.sun_irradiance_ground = solar * sun_ground;
         light.sky_irradiance_ground = solar * sky_ground;
     }

@@ -5,11 +5,11 @@
 //! let background = Background::new(&gpu, model, extent, downscale, precision)?;
 //! let mut shadow = CloudShadow::new(&gpu)?;
 //! // every frame, `frame` being the FrameParams buffer:
-//! atmosphere.record_luts(rec, &frame, cloud_altitude)?;   // fills atmosphere.sky_light()
-//! background.record_opaque(rec, &atmosphere, &frame)?;    // before `blend`: fills background.low_opaque
-//! shadow.record(rec, &tiling, particles, camera)?;        // after `tiling`; optional
-//! background.record(rec, &atmosphere, &frame, &shadow)?;  // fills background.radiance
-//! let cloud = background.record_cloud_air(rec, &atmosphere, &frame, &targets)?; // after `blend`
+//! shadow.record(rec, &tiling, particles, camera, xi)?;            // after `tiling`; optional
+//! atmosphere.record_luts(rec, &frame, &shadow, cloud_base)?;      // fills atmosphere.sky_light()
+//! background.record_opaque(rec, &atmosphere, &frame)?;            // before `blend`: fills background.low_opaque
+//! background.record(rec, &atmosphere, &frame, &shadow, cloud_base)?; // fills background.radiance
+//! let cloud = background.record_cloud_air(rec, &atmosphere, &frame, &targets, cloud_base)?; // after `blend`
 //! ```
 //!
 //! Rayleigh and aerosol single scattering are integrated along rays, all higher orders come from Hillaire's closed form

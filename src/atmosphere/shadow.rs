@@ -30,7 +30,7 @@ assert_layout!(Push, cloud_shadow_push, { centre: CENTRE, extent: EXTENT, diffus
 /// (`glsl/atmosphere/shadow_map.glsl`).
 pub struct CloudShadow {
     pipeline: ComputePipeline,
-    /// The map.
+    /// The map: the share of all sunlight in red, of what comes straight from the sun in green.
     pub image: Image,
     centre: [f32; 2],
     extent: f32,
@@ -46,7 +46,7 @@ impl CloudShadow {
                 &ImageDesc {
                     name: "cloud shadow",
                     extent: [SIZE, SIZE, 0],
-                    format: vk::Format::R16_SFLOAT,
+                    format: vk::Format::R16G16_SFLOAT,
                     usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE,
                 },
             )?,

@@ -1,6 +1,6 @@
 //! Fills the tables of the clear air and computes its light on clouds and ground.
 
-use super::{Air, SkyLight};
+use super::{Air, CloudShadow, SkyLight};
 use crate::Result;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
 use crate::params::SkyModel;
@@ -8,7 +8,9 @@ use crate::shaders::{
     atmosphere_aerial_comp as aerial, atmosphere_multiple_comp as multiple, atmosphere_sky_light_comp as sky_light,
     atmosphere_sky_view_comp as sky_view, atmosphere_transmittance_comp as transmittance,
 };
+use crate::shared::assert_layout;
 use ash::vk;
+use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
 /// Texels of the transmittance table, by direction and altitude.
@@ -19,6 +21,14 @@ pub const MULTIPLE_SIZE: [u32; 2] = [32, 32];
 pub const SKY_VIEW_SIZE: [u32; 2] = [64, 192];
 /// Texels of the aerial perspective, by azimuth, elevation (odd: one row is horizontal) and distance.
 pub const AERIAL_SIZE: [u32; 3] = [32, 65, 32];
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct SkyLightPush {
+    cloud_altitude: f32,
+    shadowed: u32,
+}
+assert_layout!(SkyLightPush, sky_light_push, { cloud_altitude: CLOUD_ALTITUDE, shadowed: SHADOWED });
 
 /// The tables of one sky, and what fills them.
 pub struct Atmosphere {
@@ -100,9 +110,15 @@ impl Atmosphere {
     }
 
     /// Fills what depends on the frame (and once what does not): sky view, aerial perspective, light on clouds and
-    /// ground. `frame` holds [`FrameParams`](crate::shared::FrameParams), `cloud_base` is the lowest altitude
+    /// ground. `frame` holds [`FrameParams`](crate::shared::FrameParams), `shadow` what the clouds let through to the ground, `cloud_base` is the lowest altitude
     /// of the clouds, where their light is taken \[m\]. With no sky only the light is written.
-    pub fn record_luts(&mut self, rec: &mut Recorder<'_>, frame: &Buffer, cloud_base: f32) -> Result<()> {
+    pub fn record_luts(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        frame: &Buffer,
+        shadow: &CloudShadow,
+        cloud_base: f32,
+    ) -> Result<()> {
         let linear = |image| Image::sampled(image, Sampler::LinearClamp);
         rec.pass("atmosphere", |rec| {
             if self.model == SkyModel::Atmosphere {
@@ -147,8 +163,10 @@ impl Atmosphere {
                 transmittance_lut: linear(&self.transmittance),
                 multiple_lut: linear(&self.multiple),
                 sky_light: &self.sky_light,
+                cloud_shadow: linear(&shadow.image),
             };
-            rec.dispatch(&self.fill_sky_light, &bindings, &cloud_base, [1, 1, 1])
+            let push = SkyLightPush { cloud_altitude: cloud_base, shadowed: u32::from(shadow.place().1 > 0.0) };
+            rec.dispatch(&self.fill_sky_light, &bindings, &push, [1, 1, 1])
         })
     }
 }
