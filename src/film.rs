@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Radiance that exposure 0 EV maps to 1 before the tone curve. Relative to the sun's irradiance outside the atmosphere:
 /// a white Lambertian surface facing it would have 0.32.
-pub const REFERENCE_RADIANCE: f32 = 0.36;
+pub const REFERENCE_RADIANCE: f32 = 0.29;
 
 /// Irradiance on a surface that faces the sun 45° high, 1000 m above the sea in the default air [W m⁻² nm⁻¹]: the light
 /// that shows white, as on a daylight film. Clouds are then neither yellow nor blue, and the evening stays warm.

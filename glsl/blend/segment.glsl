@@ -45,10 +45,12 @@ Segment fragment_segment() {
         s.colour = p.colour;
     } else {
         // The noise's slope turns the surface that light meets, but never away from the eye.
+        vec3 normal_us = entry_us;
         float shift = length(normal_shift);
-        vec3 normal_us = entry_us + rotate_inverse(p.rotation, normal_shift / (1.0 + shift));
-        normal_us -= max(dot(normal_us, ray.dir_us) + 0.05, 0.0) * ray.dir_us;
-        normal_us = normalize(normal_us);
+        if (shift > 0.0) {
+            normal_us += rotate_inverse(p.rotation, normal_shift / (1.0 + shift));
+            normal_us = normalize(normal_us - max(dot(normal_us, ray.dir_us) + 0.05, 0.0) * ray.dir_us);
+        }
         vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
         float tau_chord = sigma * (t_exit - t_enter);
         s.colour = shade_tables(medium.params, sky_light.params, lights.elements[particle_index], scattering_lut, f, p, ray, normal_us,
