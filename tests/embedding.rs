@@ -12,7 +12,9 @@ use welkin::gpu::{
     Access, Allocation, Allocator, BlendState, DefaultFactory, DeviceFeatures, Gpu, Image, MemoryLocation,
     PipelineDesc, PipelineFactory, PipelineKind, RawDevice, RecorderState,
 };
-use welkin::params::{Aim, Blend, Camera, Clouds, Lighting, Params, ParticleDesc, Precision, SkyModel, Source, Style};
+use welkin::params::{
+    Aim, Blend, Camera, Clouds, Lighting, Params, ParticleDesc, Precision, SkyModel, Source, Style, SunPosition,
+};
 use welkin::renderer::Renderer;
 use welkin::{Error, Result};
 
@@ -71,14 +73,19 @@ impl<'h> Embedded<'h> {
     fn new(host: &'h Host, gpu: Arc<Gpu>, params: Params) -> Self {
         let renderer = Renderer::new(&gpu, &params, SIZE, 1).unwrap();
         let mut embedded = Self { renderer, state: RecorderState::new(&gpu, 1).unwrap(), gpu, params, host };
-        // A first frame for the lists' sizes, as a host does at load time; `submit` waits, so the device is idle.
+        embedded.settle();
+        embedded
+    }
+
+    /// Frames for the lists' sizes, as a host has them at load time. `submit` waits, so the device is idle.
+    fn settle(&mut self) {
         for _ in 0..8 {
-            embedded.record(None, None, |_| (), |_, _| ());
-            if !embedded.renderer.wants_more(0) {
-                return embedded;
+            self.record(None, None, |_| (), |_, _| ());
+            if !self.renderer.wants_more(0) {
+                return;
             }
-            assert!(embedded.renderer.finish(&embedded.gpu, 0).unwrap());
-            embedded.state.forget();
+            assert!(self.renderer.finish(&self.gpu, 0).unwrap());
+            self.state.forget();
         }
         panic!("the lists keep growing");
     }
@@ -169,6 +176,41 @@ fn any_entry_layout_gives_the_same_picture() {
             });
             assert!(picture == expected, "another picture from entry {entry:?}");
         }
+    }
+    assert_eq!(host.finish(), Vec::<String>::new());
+}
+
+#[test]
+#[should_panic(expected = "the host's picture is lent: acquire it before a pass uses it")]
+fn a_lent_image_that_was_not_acquired_is_refused() {
+    let host = Host::new(DeviceFeatures::WANTED, true);
+    let image = HostImage::new(&host, vk::Format::R8G8B8A8_UNORM, 4, SIZE);
+    let gpu = gpu(host.raw());
+    let (lent, mut state) = (wrap(&gpu, "the host's picture", &image), RecorderState::new(&gpu, 1).unwrap());
+    // SAFETY: `cmd` records, and nothing was recorded before.
+    host.submit(|cmd| unsafe { state.begin(cmd, 0) }.clear_image(&lent, [0.0; 4]));
+}
+
+#[test]
+fn the_sun_moves_between_frames() {
+    let host = Host::new(DeviceFeatures::WANTED, true);
+    {
+        let image = HostImage::new(&host, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE);
+        let mut early = params();
+        early.sky.model = SkyModel::Atmosphere;
+        let mut late = early.clone();
+        late.sun.position = SunPosition::Angles { elevation: 4.0, azimuth: 280.0 };
+        let mut moving = Embedded::new(&host, gpu(host.raw()), early);
+        let output = Output::new(&moving.gpu, OutputKind::Radiance, image.format).unwrap();
+        let before: Vec<[f32; 4]> = moving.frame_into(&output, &image, DROPPED, |_| ());
+        moving.renderer.set_sun(late.sun.position).unwrap();
+        moving.settle(); // Shadows are longer, and so are the light's lists.
+        let after: Vec<[f32; 4]> = moving.frame_into(&output, &image, DROPPED, |_| ());
+        let mut fresh = Embedded::new(&host, moving.gpu.clone(), late);
+        let expected: Vec<[f32; 4]> = fresh.frame_into(&output, &image, DROPPED, |_| ());
+        assert!(before != after && after == expected, "the sky is not that of the new sun");
+        let wrong = SunPosition::Angles { elevation: 91.0, azimuth: 0.0 };
+        assert!(matches!(moving.renderer.set_sun(wrong), Err(Error::InvalidParam { .. })));
     }
     assert_eq!(host.finish(), Vec::<String>::new());
 }

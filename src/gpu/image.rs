@@ -30,7 +30,7 @@ pub struct Image {
     extent: [u32; 3],
     format: vk::Format,
     allocation: Option<Allocation>,
-    owned: bool,
+    pub(crate) owned: bool,
 }
 
 impl Image {

@@ -502,9 +502,10 @@ impl Recorder<'_> {
         self.log(|| format!("  {command}"));
     }
 
-    /// Brings a new image to GENERAL layout, once in its life.
+    /// Brings a new image to GENERAL layout, once in its life. A lent one comes by `acquire`.
     fn initialise(&mut self, image: &Image) {
         if self.state.initialised.insert(image.id) {
+            assert!(image.owned, "{} is lent: acquire it before a pass uses it", image.name());
             let none = Access::None.masks();
             self.layout(image, none, ALL, vk::ImageLayout::UNDEFINED, vk::ImageLayout::GENERAL);
         }
