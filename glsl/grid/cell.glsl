@@ -137,6 +137,15 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
         precise float depth = (excess - 0.22) * 4.0;
         precise float reach_here = ring_reach(place.centre, place.ring, p);
         precise float core = reach_here * smooth_unit(depth);
+        // Lower, softer and smaller than the cell's own column, into which it turns as the camera recedes: a core must
+        // not show through its cover.
+        precise float over = clamp((core - shape.weight) * 4.0, 0.0, 1.0);
+        precise float drop = over * 0.12;
+        precise float lower = height * (1.0 - drop);
+        precise float softening = over * 0.4;
+        precise float softer = shape.body * (1.0 - softening);
+        shape.height = lower;
+        shape.body = softer;
         shape.weight = max(shape.weight, core);
         if (!(shape.weight > 0.0)) { shape.layers = 0u; shape.puffs = 0u; }
     }

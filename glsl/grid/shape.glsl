@@ -39,7 +39,8 @@ Ball column_ball(CellPlace place, CellShape shape, uint layer, in GridParams p) 
     float taper = 1.0 - 0.42 * up * up;
     float outline = 0.62 + 0.38 * shape.body;
     float rare = float(h0 & 255u) / 256.0;
-    float size = 0.64 + 0.4 * unit_float(h0) + 0.6 * rare * rare;
+    float large = place.ring == 0u ? 1.1 * rare * rare * rare : 0.6 * rare * rare;
+    float size = 0.62 + 0.4 * unit_float(h0) + large;
     ball.across = edge * 1.2 * taper * outline * size;
     // The lowest layer stays flat: its undersides are the cloud's base.
     float tall = max(0.62 * step, 0.8 * ball.across) * (0.9 + 0.25 * unit_float(h1));

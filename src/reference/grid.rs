@@ -135,10 +135,10 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     let resolved = (turret_field(position, f, p.seed) - 0.4) * p.ring_layer[place.ring as usize][2];
     let tower = (resolved + 0.4) * 0.62 + 0.38;
     let fraction = (shoulder * tower) * 0.92 + 0.08;
-    let height = fraction * p.thickness;
+    let mut height = fraction * p.thickness;
     let steps_up = height * p.ring_layer[place.ring as usize][1];
     let layers = (steps_up.ceil() as i32).clamp(1, p.ring_first[place.ring as usize][2]) as u32;
-    let body = (excess * 5.0).min(1.0);
+    let mut body = (excess * 5.0).min(1.0);
     let near = p.ring_frame[place.ring as usize][2] < 400.0;
     let chance = hash_lattice(place.absolute, p.seed.wrapping_add(15)) & 1;
     let puffs = match (near, body < 1.0) {
@@ -148,7 +148,11 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
     };
     let mut weight = weight;
     if place.ring == 1 {
-        weight = weight.max(ring_reach(place.centre, 1, p) * smooth_unit((excess - 0.22) * 4.0));
+        let core = ring_reach(place.centre, 1, p) * smooth_unit((excess - 0.22) * 4.0);
+        let over = ((core - weight) * 4.0).clamp(0.0, 1.0);
+        height *= 1.0 - over * 0.12;
+        body *= 1.0 - over * 0.4;
+        weight = weight.max(core);
         if weight <= 0.0 {
             return CellShape { height, body, weight, ..CellShape::default() };
         }
@@ -195,7 +199,8 @@ fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams)
     let up = (layer as f32 + 0.5) / shape.layers as f32;
 
     let rare = (h[0] & 255) as f32 / 256.0;
-    let size = 0.64 + 0.4 * unit_float(h[0]) + 0.6 * rare * rare;
+    let large = if place.ring == 0 { 1.1 * rare * rare * rare } else { 0.6 * rare * rare };
+    let size = 0.62 + 0.4 * unit_float(h[0]) + large;
     let across = edge * 1.2 * (1.0 - 0.42 * up * up) * (0.62 + 0.38 * shape.body) * size;
     let tall = (0.62 * step).max(0.8 * across) * (0.9 + 0.25 * unit_float(h[1]));
     let tall = if layer == 0 { tall.min(0.8 * step) } else { tall };
