@@ -289,7 +289,7 @@ impl HostImage {
     }
 
     pub fn read<T: bytemuck::Pod>(&self) -> Vec<T> {
-        self.mapped(|bytes| bytemuck::pod_collect_to_vec(bytes))
+        self.mapped(|bytes| bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
     }
 }
 
