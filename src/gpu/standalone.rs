@@ -252,11 +252,6 @@ impl Drop for Instance {
     }
 }
 
-/// Reading before writing across draws under interlock is reported although the interlock orders it:
-/// <https://github.com/KhronosGroup/Vulkan-ValidationLayers/issues/4387>. Matched by exact id and by the interlock's
-/// resource name alone.
-const INTERLOCK_FALSE_POSITIVE: &str = "SYNC-HAZARD-READ-AFTER-WRITE";
-
 /// SAFETY: called by the validation layer with the pointers that the messenger was created with.
 unsafe extern "system" fn collect(
     _: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -269,11 +264,6 @@ unsafe extern "system" fn collect(
     let (messages, data) = unsafe { (&*user.cast::<Mutex<Vec<String>>>(), &*data) };
     // SAFETY: the layer passes strings that are null or end in a zero byte.
     let text = unsafe { data.message_as_c_str() }.map(|text| text.to_string_lossy().into_owned()).unwrap_or_default();
-    // SAFETY: as above.
-    let id = unsafe { data.message_id_name_as_c_str() }.map(|id| id.to_string_lossy().into_owned()).unwrap_or_default();
-    if id == INTERLOCK_FALSE_POSITIVE && text.contains("interlocked") {
-        return vk::FALSE;
-    }
     messages.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text);
     vk::FALSE
 }
