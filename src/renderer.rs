@@ -281,7 +281,7 @@ impl Renderer {
         if model == SkyModel::Atmosphere {
             self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera, self.params.clouds.xi)?;
         }
-        self.atmosphere.record_luts(rec, frame_buffer, &self.shadow, cloud_base)?;
+        self.atmosphere.record_luts(rec, frame_buffer, &frame, &self.shadow, cloud_base)?;
         let (atmosphere, background) = (&self.atmosphere, &self.background);
         background.record_opaque(rec, atmosphere, frame_buffer)?;
         background.record(rec, atmosphere, frame_buffer, &self.shadow, cloud_base)?;

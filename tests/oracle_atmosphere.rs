@@ -61,8 +61,8 @@ impl Setup {
     }
 
     fn fill_under(&mut self, shadow: &CloudShadow, cloud_altitude: f32) {
-        let (atmosphere, frame) = (&mut self.atmosphere, &self.frame);
-        self.device.frames().run(|rec| atmosphere.record_luts(rec, frame, shadow, cloud_altitude)).unwrap();
+        let (atmosphere, frame, params) = (&mut self.atmosphere, &self.frame, &self.params);
+        self.device.frames().run(|rec| atmosphere.record_luts(rec, frame, params, shadow, cloud_altitude)).unwrap();
     }
 
     fn view(&self, x: u32, y: u32) -> DVec3 {

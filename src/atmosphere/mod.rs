@@ -6,7 +6,7 @@
 //! let mut shadow = CloudShadow::new(&gpu)?;
 //! // every frame, `frame` being the FrameParams buffer:
 //! shadow.record(rec, &tiling, particles, camera, xi)?;            // after `tiling`; optional
-//! atmosphere.record_luts(rec, &frame, &shadow, cloud_base)?;      // fills atmosphere.sky_light()
+//! atmosphere.record_luts(rec, &frame, &frame_params, &shadow, cloud_base)?; // fills atmosphere.sky_light()
 //! background.record_opaque(rec, &atmosphere, &frame)?;            // before `blend`: fills background.low_opaque
 //! background.record(rec, &atmosphere, &frame, &shadow, cloud_base)?; // fills background.radiance
 //! let cloud = background.record_cloud_air(rec, &atmosphere, &frame, &targets, cloud_base)?; // after `blend`

@@ -8,7 +8,7 @@ use crate::shaders::{
     atmosphere_aerial_comp as aerial, atmosphere_multiple_comp as multiple, atmosphere_sky_light_comp as sky_light,
     atmosphere_sky_view_comp as sky_view, atmosphere_transmittance_comp as transmittance,
 };
-use crate::shared::assert_layout;
+use crate::shared::{FrameParams, assert_layout};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -34,6 +34,8 @@ assert_layout!(SkyLightPush, sky_light_push, { cloud_altitude: CLOUD_ALTITUDE, s
 pub struct Atmosphere {
     model: SkyModel,
     filled: bool,
+    /// Camera altitude, sine of the sun's elevation and cloud base that the sky view was filled for.
+    view: Option<[f32; 3]>,
     fill_transmittance: ComputePipeline,
     fill_multiple: ComputePipeline,
     fill_sky_view: ComputePipeline,
@@ -78,6 +80,7 @@ impl Atmosphere {
         Ok(Self {
             model,
             filled: false,
+            view: None,
             fill_transmittance: ComputePipeline::new(gpu, &transmittance::PROGRAM, &[])?,
             fill_multiple: ComputePipeline::new(gpu, &multiple::PROGRAM, &[])?,
             fill_sky_view: ComputePipeline::new(gpu, &sky_view::PROGRAM, &[])?,
@@ -109,13 +112,15 @@ impl Atmosphere {
         &self.sky_light
     }
 
-    /// Fills what depends on the frame (and once what does not): sky view, aerial perspective, light on clouds and
-    /// ground. `frame` holds [`FrameParams`](crate::shared::FrameParams), `shadow` what the clouds let through to the ground, `cloud_base` is the lowest altitude
-    /// of the clouds, where their light is taken \[m\]. With no sky only the light is written.
+    /// Fills the tables: once those of the air alone, sky view and aerial perspective when the camera's altitude, the
+    /// sun's elevation or `cloud_base` change, and every frame the light on clouds and ground. `frame` holds `params`;
+    /// `shadow` is what the clouds let through to the ground; `cloud_base` is the lowest altitude of the clouds, where
+    /// their light is taken \[m\]. With no sky only the light is written.
     pub fn record_luts(
         &mut self,
         rec: &mut Recorder<'_>,
         frame: &Buffer,
+        params: &FrameParams,
         shadow: &CloudShadow,
         cloud_base: f32,
     ) -> Result<()> {
@@ -135,6 +140,10 @@ impl Atmosphere {
                     rec.dispatch(&self.fill_multiple, &bindings, &(), [w, h, 1])?;
                     self.filled = true;
                 }
+            }
+            let view = [params.camera[1] + params.origin[1], params.to_sun[1], cloud_base];
+            if self.model == SkyModel::Atmosphere && self.view != Some(view) {
+                self.view = Some(view);
                 let bindings = sky_view::Bindings {
                     air: &self.air,
                     frame,
