@@ -3,7 +3,7 @@
 use ash::vk;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, Image, ImageDesc};
-use welkin::params::{Camera, Params, Preset};
+use welkin::params::{Camera, Params, Preset, SkyModel};
 use welkin::renderer::{Renderer, TableImages};
 
 const SIZE: [u32; 2] = [96, 64];
@@ -98,6 +98,8 @@ fn a_thousand_frames_of_a_moving_camera_leak_nothing() {
     let tables = Tables::new(&mut device);
     let mut params = params();
     (params.quality.cells, params.quality.rings) = (24, 1);
+    // The sky's tables take most of such a small frame on a CPU; every other pass runs a thousand times.
+    params.sky.model = SkyModel::None;
     let gpu = device.gpu().clone();
     let before = gpu.memory_use();
     {
