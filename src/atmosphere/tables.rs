@@ -126,20 +126,18 @@ impl Atmosphere {
     ) -> Result<()> {
         let linear = |image| Image::sampled(image, Sampler::LinearClamp);
         rec.pass("atmosphere", |rec| {
-            if self.model == SkyModel::Atmosphere {
-                if !self.filled {
-                    let [w, h] = TRANSMITTANCE_SIZE;
-                    let bindings = transmittance::Bindings { air: &self.air, table: &self.transmittance };
-                    rec.dispatch(&self.fill_transmittance, &bindings, &(), [w, h, 1])?;
-                    let [w, h] = MULTIPLE_SIZE;
-                    let bindings = multiple::Bindings {
-                        air: &self.air,
-                        transmittance_lut: linear(&self.transmittance),
-                        table: &self.multiple,
-                    };
-                    rec.dispatch(&self.fill_multiple, &bindings, &(), [w, h, 1])?;
-                    self.filled = true;
-                }
+            if self.model == SkyModel::Atmosphere && !self.filled {
+                let [w, h] = TRANSMITTANCE_SIZE;
+                let bindings = transmittance::Bindings { air: &self.air, table: &self.transmittance };
+                rec.dispatch(&self.fill_transmittance, &bindings, &(), [w, h, 1])?;
+                let [w, h] = MULTIPLE_SIZE;
+                let bindings = multiple::Bindings {
+                    air: &self.air,
+                    transmittance_lut: linear(&self.transmittance),
+                    table: &self.multiple,
+                };
+                rec.dispatch(&self.fill_multiple, &bindings, &(), [w, h, 1])?;
+                self.filled = true;
             }
             let view = [params.camera[1] + params.origin[1], params.to_sun[1], cloud_base];
             if self.model == SkyModel::Atmosphere && self.view != Some(view) {
