@@ -146,12 +146,13 @@
 //! Light (Yusov 5.3):
 //! - **One grid of light tiles for each ring**, not one for all: 64² tiles over 200 km would put thousands of particles in a
 //!   list. (`tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height`)
-//! - **Lists are the same with and without interlock**: without it, insertion by atomic exchange and a merge sort.
+//! - **Lists are the same with and without interlock**: without it, insertion by atomic exchange and a merge sort. CPU devices
+//!   sort although they have it, because that is faster there.
 //!   (`tests/oracle_tiling.rs::lists_are_the_same_however_they_are_ordered`)
 //! - **An occluder counts with its own density**, not with the receiver's†.
 //!   (`tests/oracle_lighting.rs::an_occluder_counts_with_its_own_density`)
 //! - **Light is found at three points of a particle**, both poles towards the sun and the centre: overlapping particles agree on
-//!   the light between them. (`tests/oracle_lighting.rs::the_chord_ahead_is_whole_in_front_half_from_the_centre_none_behind`)
+//!   the light between them. (`tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height` checks all three)
 //! - **Smoothing takes the layer below layer 1 too** (skipped†).
 //!   (`tests/oracle_lighting.rs::layer_one_is_smoothed_with_the_layer_below_it`)
 //! - **Every particle is lit**, seen or not: light must not change when the camera turns.
@@ -160,6 +161,7 @@
 //! Shading (Yusov 4.4, 5.4):
 //! - **Multiple scattering is looked up at five times the particle's optical radius** (`glsl/blend/shade.glsl`): light diffuses
 //!   through the cloud, of which the particle is a part. Tuned by eye; a path-traced cloud would settle it.
+//!   (`tests/shading.rs::a_lone_ellipsoid_composites_to_equation_8` holds the look-up, not the factor)
 //! - **Detail noise displaces the surface**, along silhouettes too, in octaves anchored to the world; the paper does not say how
 //!   it adds it. (`tests/oracle_detail.rs::every_texel_of_the_tile_is_the_noise_at_its_centre`)
 //!
@@ -176,6 +178,10 @@
 //! - **Aerosol single scattering is stored without its phase function**, so that the aureole stays sharp, and **aerial
 //!   perspective lives in directions relative to the sun**, so that it does not change when the camera turns.
 //!   (`tests/oracle_atmosphere.rs::tables_follow_the_oracle`)
+//! - **Ground under clouds gets what a two-stream layer lets through**, 1 / (1 + 3/4 (1 − g) τ), not exp(−τ): an overcast day is
+//!   grey, not black (`glsl/atmosphere/cloud_shadow.comp`; no test of its own yet).
+//! - **Shafts of light come from the map of cloud shadows**, not from epipolar samples.
+//!   (`tests/oracle_atmosphere.rs::shadow_takes_the_sunlit_air_below_the_clouds_away`)
 
 #![deny(clippy::unwrap_used, clippy::expect_used)] // Tests and examples may.
 
