@@ -11,4 +11,3 @@ layout(binding = 8) uniform sampler2D opaque_distance;
 
 layout(binding = 12, std430) restrict readonly buffer Sky { SkyLight params; } sky_light;
 
-layout(location = 0) flat in uint particle_index;

@@ -13,9 +13,10 @@ layout(binding = 9, rgba32f) coherent uniform image2D interlocked_committed;   /
 layout(binding = 10, rgba32f) coherent uniform image2D interlocked_pending;    // colour, optical depth
 layout(binding = 11, rg32f) coherent uniform image2D interlocked_extent;       // t_enter, t_exit
 #include "blend/segment.glsl"
+layout(location = 0) flat in uint particle_index;
 
 void main() {
-    Segment incoming = fragment_segment();
+    Segment incoming = particle_segment(particle_index, gl_FragCoord.xy);
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     // Begin and end stand once, at the top level of main, in uniform control flow; an empty segment passes through.
     beginInvocationInterlockARB();

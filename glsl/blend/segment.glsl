@@ -1,11 +1,12 @@
-// The segment that this fragment's particle cuts out of its view ray. Included after the bindings that it reads.
+// The segment that a particle cuts out of the view ray of a pixel. Included after the bindings that it reads.
 layout(constant_id = 0) const uint LIGHTING = LIGHTING_TABLES;
 layout(constant_id = 1) const uint HOMOGENEOUS = 0;   // 1: density 1 everywhere inside, no table and no detail
 
-Segment fragment_segment() {
+// `pixel`: centre of the pixel, as gl_FragCoord.xy has it.
+Segment particle_segment(uint index, vec2 pixel) {
     FrameParams f = frame.params;
-    Particle p = particles.elements[particle_index];
-    vec3 dir = view_ray(f, gl_FragCoord.xy, vec2(f.low_width, f.low_height));
+    Particle p = particles.elements[index];
+    vec3 dir = view_ray(f, pixel, vec2(f.low_width, f.low_height));
     BallRay ray = ball_ray(p, f.camera, dir);
     if (ray.b2 >= 1.0) return NO_SEGMENT;
 
@@ -28,7 +29,7 @@ Segment fragment_segment() {
 
     float t_enter = ray.t_closest - half_chord * ray.metres;
     float t_exit = ray.t_closest + half_chord * ray.metres;
-    float t_opaque = texelFetch(opaque_distance, ivec2(gl_FragCoord.xy), 0).x;
+    float t_opaque = texelFetch(opaque_distance, ivec2(pixel), 0).x;
     Segment s;
     s.t_enter = max(t_enter, 0.0);
     s.t_exit = min(t_exit, t_opaque);
@@ -53,7 +54,7 @@ Segment fragment_segment() {
         }
         vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
         float tau_chord = sigma * (t_exit - t_enter);
-        s.colour = shade_tables(medium.params, sky_light.params, lights.elements[particle_index], scattering_lut, f, p, ray, normal_us,
+        s.colour = shade_tables(medium.params, sky_light.params, lights.elements[index], scattering_lut, f, p, ray, normal_us,
                                 dir, normal_ws, tau_chord, matter.y + depth);
     }
     return s;
