@@ -19,7 +19,12 @@ pub struct Options {
     pub factory: Option<Box<dyn PipelineFactory>>,
     /// Optional features to leave disabled, for example to test a fallback.
     pub without: Vec<Feature>,
+    /// Adds extensions and features that the physical device has to those that the renderer uses.
+    pub setup: Option<Box<SetupHook>>,
 }
+
+/// See [`Options::setup`].
+pub type SetupHook = dyn FnOnce(&ash::Instance, vk::PhysicalDevice, &mut DeviceSetup);
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -73,8 +78,11 @@ impl Standalone {
         let usable = |feature| !options.without.contains(&feature) && capabilities.supports(feature).is_ok();
         let interlock = usable(Feature::FragmentShaderInterlock);
         let attachment_access = usable(Feature::RasterizationOrderAttachmentAccess);
-        let device =
-            create_device(&instance.raw, physical_device, capabilities.queue_family, interlock, attachment_access)?;
+        let mut setup = DeviceSetup::new(interlock, attachment_access);
+        if let Some(add) = options.setup {
+            add(&instance.raw, physical_device, &mut setup);
+        }
+        let device = setup.create(&instance.raw, physical_device, capabilities.queue_family)?;
         let owner = Device { device: device.clone(), _instance: instance.clone() };
         let raw = RawDevice {
             instance: instance.raw.clone(),
@@ -307,39 +315,81 @@ fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice
     })
 }
 
-fn create_device(
-    instance: &ash::Instance,
-    physical_device: vk::PhysicalDevice,
-    family: u32,
-    interlock: bool,
-    attachment_access: bool,
-) -> Result<ash::Device> {
-    let priorities = [1.0];
-    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
-    let mut extensions = Vec::new();
-    let (mut core, mut v12, mut v13) = Default::default();
-    DeviceFeatures::WANTED.enable(&mut core, &mut v12, &mut v13);
-    let mut ordered =
-        vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT::default().fragment_shader_pixel_interlock(true);
-    let mut attachment = vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT::default()
-        .rasterization_order_color_attachment_access(true);
-    let mut features = vk::PhysicalDeviceFeatures2::default().features(core).push_next(&mut v12).push_next(&mut v13);
-    if interlock {
-        extensions.push(ash::ext::fragment_shader_interlock::NAME.as_ptr());
-        features = features.push_next(&mut ordered);
+/// What a device is created with: [`Options::setup`] may add to it what the device has.
+#[derive(Default)]
+pub struct DeviceSetup {
+    /// Device extensions, each once. The structs of extensions below count only where theirs is in this list.
+    pub extensions: Vec<&'static CStr>,
+    /// Features of Vulkan 1.0.
+    pub core: vk::PhysicalDeviceFeatures,
+    /// Features of Vulkan 1.1.
+    pub vulkan11: vk::PhysicalDeviceVulkan11Features<'static>,
+    /// Features of Vulkan 1.2.
+    pub vulkan12: vk::PhysicalDeviceVulkan12Features<'static>,
+    /// Features of Vulkan 1.3.
+    pub vulkan13: vk::PhysicalDeviceVulkan13Features<'static>,
+    /// `VK_EXT_fragment_shader_interlock`.
+    pub interlock: vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT<'static>,
+    /// `VK_EXT_rasterization_order_attachment_access`.
+    pub attachment_access: vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT<'static>,
+    /// `VK_KHR_dynamic_rendering_local_read`.
+    pub local_read: vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR<'static>,
+}
+
+impl DeviceSetup {
+    /// What the renderer needs, and the optional features that were asked for.
+    fn new(interlock: bool, attachment_access: bool) -> Self {
+        let mut setup = Self::default();
+        DeviceFeatures::WANTED.enable(&mut setup.core, &mut setup.vulkan12, &mut setup.vulkan13);
+        if interlock {
+            setup.extensions.push(ash::ext::fragment_shader_interlock::NAME);
+            setup.interlock.fragment_shader_pixel_interlock = vk::TRUE;
+        }
+        if attachment_access {
+            setup.extensions.push(ash::ext::rasterization_order_attachment_access::NAME);
+            setup.attachment_access.rasterization_order_color_attachment_access = vk::TRUE;
+        }
+        setup
     }
-    if attachment_access {
-        extensions.push(ash::ext::rasterization_order_attachment_access::NAME.as_ptr());
-        features = features.push_next(&mut attachment);
+
+    fn create(
+        mut self,
+        instance: &ash::Instance,
+        physical_device: vk::PhysicalDevice,
+        family: u32,
+    ) -> Result<ash::Device> {
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
+        let has = |name: &CStr| self.extensions.contains(&name);
+        let (interlock, attachment_access, local_read) = (
+            has(ash::ext::fragment_shader_interlock::NAME),
+            has(ash::ext::rasterization_order_attachment_access::NAME),
+            has(ash::khr::dynamic_rendering_local_read::NAME),
+        );
+        let extensions: Vec<_> = self.extensions.iter().map(|name| name.as_ptr()).collect();
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .features(self.core)
+            .push_next(&mut self.vulkan11)
+            .push_next(&mut self.vulkan12)
+            .push_next(&mut self.vulkan13);
+        if interlock {
+            features = features.push_next(&mut self.interlock);
+        }
+        if attachment_access {
+            features = features.push_next(&mut self.attachment_access);
+        }
+        if local_read {
+            features = features.push_next(&mut self.local_read);
+        }
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .push_next(&mut features);
+        // SAFETY: every pointer in the description is alive; features and extensions were probed.
+        unsafe { instance.create_device(physical_device, &info, None) }.map_err(|result| Error::Vulkan {
+            call: "vkCreateDevice",
+            pass: "the device".to_owned(),
+            result,
+        })
     }
-    let info = vk::DeviceCreateInfo::default()
-        .queue_create_infos(&queues)
-        .enabled_extension_names(&extensions)
-        .push_next(&mut features);
-    // SAFETY: every pointer in the description is alive; features and extensions were probed.
-    unsafe { instance.create_device(physical_device, &info, None) }.map_err(|result| Error::Vulkan {
-        call: "vkCreateDevice",
-        pass: "the device".to_owned(),
-        result,
-    })
 }
