@@ -47,9 +47,6 @@ pub struct PictureArgs {
     /// Preset of the particle grid; keys of the scene's [quality] still count
     #[arg(long, value_enum)]
     pub quality: Option<QualityArg>,
-    /// How overlapping particles are composited: auto, interlock[:K], alpha
-    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
-    pub blend: Option<Blend>,
     /// Which tables to light particles from
     #[arg(long, value_enum, default_value_t)]
     pub tables: TablesArg,
@@ -92,6 +89,9 @@ pub struct RenderArgs {
     /// .png holds the toned picture; .exr and .npy hold linear scene radiance, height x width x 3.
     #[arg(short, long, value_name = "OUT.{png,exr,npy}")]
     pub output: Option<PathBuf>,
+    /// How overlapping particles are composited: auto, interlock[:K], alpha
+    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
+    pub blend: Option<Blend>,
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Render frames A to B-1 of the scene's [animation] to OUT.0000.png, OUT.0001.png, ...
@@ -133,6 +133,9 @@ pub struct BenchArgs {
     /// Print JSON (docs/json.md)
     #[arg(long)]
     pub json: bool,
+    /// How overlapping particles are composited: auto, interlock[:K], alpha
+    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
+    pub blend: Option<Blend>,
     /// Compare with this mode in the same run, frame by frame in turns
     #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
     pub vs: Option<Blend>,
@@ -245,7 +248,7 @@ mod tests {
         )
         .unwrap();
         assert_eq!(args.picture.size, Size { width: 64, height: 32 });
-        assert_eq!((args.picture.quality, args.picture.blend), (Some(QualityArg::Low), Some(Blend::Interlock(4))));
+        assert_eq!((args.picture.quality, args.blend), (Some(QualityArg::Low), Some(Blend::Interlock(4))));
         assert_eq!(args.frames, Some(FrameRange(3..7)));
         assert_eq!((args.stats, args.picture.scene.set.len()), (Some("s.json".into()), 2));
     }

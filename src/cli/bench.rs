@@ -71,12 +71,9 @@ struct Contender {
 
 pub fn run(args: &BenchArgs) -> Result<()> {
     let params = scenes::load(&args.scene, &args.picture)?;
-    let mut modes = vec![params.clone()];
-    if let Some(blend) = args.vs {
-        let mut other = params;
-        other.quality.blend = blend;
-        other.validate().map_err(|error| scenes::flagged(error, "--vs"))?;
-        modes.push(other);
+    let mut modes = vec![scenes::blended(params.clone(), args.blend, "--blend")?];
+    if args.vs.is_some() {
+        modes.push(scenes::blended(params, args.vs, "--vs")?);
     }
     let mut device = Device::open(&args.picture.scene, false)?;
     let mut contenders = modes

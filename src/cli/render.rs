@@ -26,7 +26,10 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         .scenes
         .iter()
         .zip(outputs)
-        .map(|(scene, output)| Ok(Job { scene, params: scenes::load(scene, &args.picture)?, output }))
+        .map(|(scene, output)| {
+            let params = scenes::blended(scenes::load(scene, &args.picture)?, args.blend, "--blend")?;
+            Ok(Job { scene, params, output })
+        })
         .collect::<Result<Vec<_>>>()?;
     let mut device = Device::open(&args.picture.scene, args.stats.is_some())?;
     let mut reports = Vec::with_capacity(jobs.len());

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use welkin::params::Params;
+use welkin::params::{Blend, Params};
 use welkin::scene::{self, Override};
 use welkin::{Error, Result};
 
@@ -14,10 +14,14 @@ pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
     let preset =
         args.quality.map(|q| Override { flag: "--quality".into(), assignment: format!("quality.preset={}", q.name()) });
     let overrides: Vec<_> = preset.into_iter().chain(sets(&args.scene)).collect();
-    let mut params = scene::load(path, &overrides)?;
-    if let Some(blend) = args.blend {
+    scene::load(path, &overrides)
+}
+
+/// `params` with the compositing mode that `flag` chose, if it chose one.
+pub fn blended(mut params: Params, blend: Option<Blend>, flag: &str) -> Result<Params> {
+    if let Some(blend) = blend {
         params.quality.blend = blend;
-        params.validate().map_err(|error| flagged(error, "--blend"))?;
+        params.validate().map_err(|error| flagged(error, flag))?;
     }
     Ok(params)
 }
@@ -36,7 +40,7 @@ fn sets(args: &SceneArgs) -> impl Iterator<Item = Override> + '_ {
 }
 
 /// `error` about the compositing mode, named as the flag that chose it.
-pub fn flagged(error: Error, flag: &str) -> Error {
+fn flagged(error: Error, flag: &str) -> Error {
     match error {
         Error::InvalidParam { field, value, expected } if field == "quality.blend" => {
             Error::invalid(flag, value, expected)
