@@ -12,6 +12,7 @@ mod table;
 use std::path::Path;
 
 pub use atomic::write_atomic;
+pub(crate) use picture::encode_png;
 pub use picture::{Format, Picture, PngDepth, numbered, transmittance_path};
 pub use stats::{BlendStats, CapacityStats, DeviceStats, FrameStats, ParticleStats, PassStats, Stats, TableStats};
 pub use table::{Axis, AxisValues, Table, write_tables};

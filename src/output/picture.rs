@@ -1,6 +1,6 @@
 //! A finished picture and its files.
 
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use image::codecs::openexr::OpenExrEncoder;
@@ -96,29 +96,32 @@ impl Picture {
         [&[u64::from(self.height), u64::from(self.width)], channels].concat()
     }
 
-    /// Refuses values that are not finite, and buffers of the wrong length.
-    fn check(&self, path: &Path) -> Result<()> {
+    /// What is not finite in it, in words: which buffer, how many pixels, and the first of them. None of a sound picture.
+    ///
+    /// # Panics
+    /// If a buffer does not hold one value a pixel.
+    #[must_use]
+    pub fn fault(&self) -> Option<String> {
         let pixels = self.width as usize * self.height as usize;
         let lengths = [self.radiance.len(), self.display.len(), self.transmittance.as_ref().map_or(pixels, Vec::len)];
         assert!(lengths.iter().all(|&length| length == pixels), "a picture's buffers hold one value a pixel");
         let bad = |finite: &dyn Fn(usize) -> bool, what: &str| {
             let count = (0..pixels).filter(|&pixel| !finite(pixel)).count();
-            match (0..pixels).find(|&pixel| !finite(pixel)) {
-                None => Ok(()),
-                Some(pixel) => {
-                    let (x, y) = (pixel % self.width as usize, pixel / self.width as usize);
-                    let reason =
-                        format!("not written: {what} is not finite in {count} pixels, first at column {x}, row {y}");
-                    Err(Error::file(path, reason))
-                }
-            }
+            let first = (0..pixels).find(|&pixel| !finite(pixel))?;
+            let (x, y) = (first % self.width as usize, first / self.width as usize);
+            Some(format!("{what} is not finite in {count} pixels, first at column {x}, row {y}"))
         };
-        bad(&|pixel| self.radiance[pixel].iter().all(|v| v.is_finite()), "radiance")?;
-        bad(&|pixel| self.display[pixel].iter().all(|v| v.is_finite()), "the toned picture")?;
-        match &self.transmittance {
-            Some(transmittance) => bad(&|pixel| transmittance[pixel].is_finite(), "transmittance"),
-            None => Ok(()),
-        }
+        bad(&|pixel| self.radiance[pixel].iter().all(|v| v.is_finite()), "radiance")
+            .or_else(|| bad(&|pixel| self.display[pixel].iter().all(|v| v.is_finite()), "the toned picture"))
+            .or_else(|| {
+                let transmittance = self.transmittance.as_ref()?;
+                bad(&|pixel| transmittance[pixel].is_finite(), "transmittance")
+            })
+    }
+
+    /// Refuses values that are not finite.
+    fn check(&self, path: &Path) -> Result<()> {
+        self.fault().map_or(Ok(()), |fault| Err(Error::file(path, format!("not written: {fault}"))))
     }
 
     /// Display values in 8 bits. The dither never changes a value that 8 bits hold exactly.
@@ -137,10 +140,19 @@ impl Picture {
     }
 
     fn write_png(&self, path: &Path, colour: ExtendedColorType, bytes: &[u8]) -> Result<()> {
-        write_atomic(path, |file| {
-            let encoder = PngEncoder::new_with_quality(file, CompressionType::Default, FilterType::Adaptive);
-            encoder.write_image(bytes, self.width, self.height, colour).map_err(io_error)
-        })
+        write_atomic(path, |file| encode_png(file, [self.width, self.height], colour, bytes))
+    }
+
+    /// The toned picture as the bytes of a PNG file of 8 bits a channel.
+    ///
+    /// # Errors
+    /// [`Error::File`] when a value is not finite.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.check(Path::new("a PNG in memory"))?;
+        encode_png(&mut bytes, [self.width, self.height], ExtendedColorType::Rgb8, &self.codes_8())
+            .map_err(|error| Error::file("a PNG in memory", error))?;
+        Ok(bytes)
     }
 
     fn write_exr(&self, path: &Path) -> Result<()> {
@@ -164,6 +176,17 @@ pub fn transmittance_path(picture: &Path) -> PathBuf {
 pub fn numbered(picture: &Path, frame: u32) -> PathBuf {
     let extension = picture.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
     picture.with_extension(format!("{frame:04}.{extension}"))
+}
+
+/// Writes `bytes` as a PNG of `size` pixels.
+pub(crate) fn encode_png(
+    file: &mut dyn Write,
+    size: [u32; 2],
+    colour: ExtendedColorType,
+    bytes: &[u8],
+) -> std::io::Result<()> {
+    let encoder = PngEncoder::new_with_quality(file, CompressionType::Default, FilterType::Adaptive);
+    encoder.write_image(bytes, size[0], size[1], colour).map_err(io_error)
 }
 
 fn io_error(error: ImageError) -> std::io::Error {

@@ -1,0 +1,285 @@
+//! Numbers about the difference of two pictures, and of two sequences.
+
+use serde::Serialize;
+
+use super::flip::{PIXELS_PER_DEGREE, flip};
+use crate::output::Picture;
+use crate::{Error, Result};
+
+/// Added to the reference's square in the relative error, so that black does not divide (Rousselle et al., *Adaptive
+/// rendering with non-local means filtering*, 2012, whose radiance is of this order).
+pub const REL_MSE_EPSILON: f64 = 0.01;
+
+/// How far a picture, or a sequence of them, is from its reference. Keys as in `metrics.json` (`docs/comparing.md`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Root mean square difference of linear radiance, over pixels and channels [W m⁻² sr⁻¹ nm⁻¹].
+    pub rmse: f64,
+    /// Mean of (I − R)² / (R² + 0.01) over pixels and channels of linear radiance.
+    pub rel_mse: f64,
+    /// Peak signal-to-noise ratio of the pictures as shown (toned, sRGB-encoded, peak 1) [dB]; none of equal pictures.
+    pub psnr: Option<f64>,
+    /// Mean ꟻLIP of the pictures as shown, 0 to 1.
+    pub flip_mean: f64,
+    /// Greatest difference of linear radiance in any pixel and channel [W m⁻² sr⁻¹ nm⁻¹].
+    pub max_abs: f64,
+}
+
+/// Sums over the pixels of one picture or of several, from which [`Metrics`] follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Errors {
+    pixels: u64,
+    squared: f64,
+    relative: f64,
+    shown_squared: f64,
+    flip: f64,
+    max_abs: f64,
+}
+
+/// The difference of a picture from its reference, pixel by pixel and in all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The sums.
+    pub errors: Errors,
+    /// ꟻLIP per pixel, 0 to 1.
+    pub flip: Vec<f64>,
+    /// Greatest difference of linear radiance over the channels, per pixel.
+    pub radiance: Vec<f64>,
+}
+
+impl Difference {
+    /// Compares `picture` with `reference`; `name` is what an error calls the picture.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParam`] when the sizes differ or a pixel of either is not finite.
+    pub fn of(name: &str, picture: &Picture, reference: &Picture) -> Result<Self> {
+        check(name, picture, reference)?;
+        let flip = flip(&picture.display, &reference.display, picture.width as usize, PIXELS_PER_DEGREE);
+        let mut errors = Errors { pixels: picture.radiance.len() as u64, flip: flip.iter().sum(), ..Errors::default() };
+        let mut radiance = Vec::with_capacity(picture.radiance.len());
+        for (a, r) in picture.radiance.iter().zip(&reference.radiance) {
+            let mut greatest = 0.0f64;
+            for (a, r) in a.iter().zip(r) {
+                let (difference, r) = (f64::from(*a) - f64::from(*r), f64::from(*r));
+                errors.squared += difference * difference;
+                errors.relative += difference * difference / (r * r + REL_MSE_EPSILON);
+                greatest = greatest.max(difference.abs());
+            }
+            errors.max_abs = errors.max_abs.max(greatest);
+            radiance.push(greatest);
+        }
+        let shown = picture.display.iter().flatten().zip(reference.display.iter().flatten());
+        errors.shown_squared = shown.map(|(a, r)| (f64::from(*a) - f64::from(*r)).powi(2)).sum();
+        Ok(Self { errors, flip, radiance })
+    }
+}
+
+impl Errors {
+    /// Takes in those of another frame.
+    pub fn add(&mut self, other: &Self) {
+        self.pixels += other.pixels;
+        self.squared += other.squared;
+        self.relative += other.relative;
+        self.shown_squared += other.shown_squared;
+        self.flip += other.flip;
+        self.max_abs = self.max_abs.max(other.max_abs);
+    }
+
+    /// The metrics over everything taken in so far; of nothing, zeros.
+    #[must_use]
+    pub fn metrics(&self) -> Metrics {
+        let pixels = (self.pixels as f64).max(1.0);
+        let values = 3.0 * pixels;
+        Metrics {
+            rmse: (self.squared / values).sqrt(),
+            rel_mse: self.relative / values,
+            psnr: (self.shown_squared > 0.0).then(|| -10.0 * (self.shown_squared / values).log10()),
+            flip_mean: self.flip / pixels,
+            max_abs: self.max_abs,
+        }
+    }
+}
+
+/// Change from frame to frame that the motion does not explain.
+///
+/// For frames I₀, I₁ and their references R₀, R₁ it is ‖(I₁ − I₀) − (R₁ − R₀)‖ / ‖R₁ − R₀‖ over the linear radiance of all
+/// pixels; over a sequence, the mean of all consecutive pairs. Where the reference does not change at all there is nothing
+/// to relate to: such pairs are counted apart, with the change that the picture made nevertheless.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Popping {
+    sum: f64,
+    pairs: u32,
+    still_pairs: u32,
+    still_squared: f64,
+    still_values: u64,
+}
+
+impl Popping {
+    /// Takes in two consecutive frames, each a picture with its reference.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParam`] when the sizes differ or a pixel is not finite.
+    pub fn add(&mut self, name: &str, before: [&Picture; 2], after: [&Picture; 2]) -> Result<()> {
+        check(name, before[0], before[1])?;
+        check(name, after[0], after[1])?;
+        check(name, before[0], after[0])?;
+        let values = |picture: usize| {
+            let pair = before[picture].radiance.iter().flatten().zip(after[picture].radiance.iter().flatten());
+            pair.map(|(before, after)| f64::from(*after) - f64::from(*before))
+        };
+        let (mut unexplained, mut explained) = (0.0, 0.0);
+        for (change, motion) in values(0).zip(values(1)) {
+            unexplained += (change - motion).powi(2);
+            explained += motion * motion;
+        }
+        if explained > 0.0 {
+            self.pairs += 1;
+            self.sum += (unexplained / explained).sqrt();
+        } else {
+            self.still_pairs += 1;
+            self.still_squared += unexplained;
+            self.still_values += 3 * before[0].radiance.len() as u64;
+        }
+        Ok(())
+    }
+
+    /// The mean over the pairs whose reference changed; none if no pair's did.
+    #[must_use]
+    pub fn mean(&self) -> Option<f64> {
+        (self.pairs > 0).then(|| self.sum / f64::from(self.pairs))
+    }
+
+    /// Pairs whose reference changed.
+    #[must_use]
+    pub fn pairs(&self) -> u32 {
+        self.pairs
+    }
+
+    /// Pairs whose reference did not change.
+    #[must_use]
+    pub fn still_pairs(&self) -> u32 {
+        self.still_pairs
+    }
+
+    /// Root mean square change of radiance over the pairs whose reference did not change; none without such pairs.
+    #[must_use]
+    pub fn still_change(&self) -> Option<f64> {
+        (self.still_pairs > 0).then(|| (self.still_squared / self.still_values.max(1) as f64).sqrt())
+    }
+}
+
+/// Refuses what cannot be compared: other sizes, values that are not finite.
+fn check(name: &str, picture: &Picture, reference: &Picture) -> Result<()> {
+    if (picture.width, picture.height) != (reference.width, reference.height) {
+        let size = format!("{}x{}", picture.width, picture.height);
+        let expected = format!("the size of its reference, {}x{}", reference.width, reference.height);
+        return Err(Error::invalid(name, size, expected));
+    }
+    for (name, picture) in [(name, picture), ("reference", reference)] {
+        if let Some(fault) = picture.fault() {
+            return Err(Error::invalid(name, fault, "a picture of finite values"));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture whose radiance is `value` of each pixel, shown as it is.
+    fn picture(width: u32, height: u32, value: impl Fn(u32, u32) -> [f32; 3]) -> Picture {
+        let radiance: Vec<_> = (0..width * height).map(|i| value(i % width, i / width)).collect();
+        Picture { width, height, display: radiance.clone(), radiance, transmittance: None }
+    }
+
+    fn uniform(value: f32) -> Picture {
+        picture(8, 4, |_, _| [value; 3])
+    }
+
+    fn metrics(a: &Picture, r: &Picture) -> Metrics {
+        Difference::of("a", a, r).unwrap().errors.metrics()
+    }
+
+    #[test]
+    fn a_uniform_offset_has_closed_forms() {
+        let m = metrics(&uniform(0.75), &uniform(0.5)); // Both exact in f32.
+        assert_eq!((m.rmse, m.max_abs), (0.25, 0.25));
+        assert!((m.rel_mse - 0.0625 / 0.26).abs() < 1e-15);
+        assert!((m.psnr.unwrap() - 20.0 * 4.0_f64.log10()).abs() < 1e-12);
+        assert!(m.flip_mean > 0.1);
+    }
+
+    #[test]
+    fn one_wrong_channel_of_one_pixel_counts_as_one_of_all() {
+        let reference = uniform(0.5);
+        let mut wrong = reference.clone();
+        wrong.radiance[5][1] = 2.5;
+        let m = metrics(&wrong, &reference);
+        assert!((m.rmse - 2.0 / (3.0 * 32.0_f64).sqrt()).abs() < 1e-15);
+        assert_eq!((m.max_abs, m.psnr, m.flip_mean), (2.0, None, 0.0)); // What is shown is the same.
+        let difference = Difference::of("a", &wrong, &reference).unwrap();
+        assert_eq!(difference.radiance.iter().filter(|d| **d > 0.0).count(), 1);
+        assert_eq!(difference.radiance[5], 2.0);
+    }
+
+    #[test]
+    fn equal_pictures_differ_in_nothing() {
+        let a = picture(8, 4, |x, y| [x as f32 / 8.0, y as f32, 0.3]);
+        let m = metrics(&a, &a);
+        assert_eq!(m, Metrics { rmse: 0.0, rel_mse: 0.0, psnr: None, flip_mean: 0.0, max_abs: 0.0 });
+    }
+
+    #[test]
+    fn sequences_are_averaged_over_all_pixels() {
+        let mut sum = Difference::of("a", &uniform(0.75), &uniform(0.5)).unwrap().errors;
+        sum.add(&Difference::of("a", &uniform(0.5), &uniform(0.5)).unwrap().errors);
+        let m = sum.metrics();
+        assert!((m.rmse - 0.25 / 2.0_f64.sqrt()).abs() < 1e-15);
+        assert!((m.psnr.unwrap() - 10.0 * 32.0_f64.log10()).abs() < 1e-12);
+        assert_eq!(m.max_abs, 0.25);
+    }
+
+    #[test]
+    fn values_that_are_not_finite_are_errors_that_name_the_pixel() {
+        let good = uniform(0.5);
+        for (which, bad) in [f32::NAN, f32::INFINITY].into_iter().enumerate() {
+            let mut wrong = good.clone();
+            wrong.radiance[11][2] = bad;
+            let message = Difference::of("b", &wrong, &good).unwrap_err().to_string();
+            assert!(
+                message.starts_with("b = radiance is not finite in 1 pixels, first at column 3, row 1"),
+                "{message}"
+            );
+            let message = Difference::of("b", &good, &wrong).unwrap_err().to_string();
+            assert!(message.starts_with("reference = "), "{which}: {message}");
+            let pair = [&good, &wrong];
+            assert!(Popping::default().add("b", [&good, &good], pair).is_err());
+        }
+        let message = Difference::of("b", &good, &picture(4, 8, |_, _| [0.5; 3])).unwrap_err().to_string();
+        assert_eq!(message, "b = 8x4: expected the size of its reference, 4x8");
+    }
+
+    #[test]
+    fn popping_is_the_change_that_motion_does_not_explain() {
+        let mut popping = Popping::default();
+        assert_eq!(popping.mean(), None);
+        // The reference brightens by 0.25 a value, the picture by 0.375: half of the motion too much.
+        popping.add("a", [&uniform(0.0), &uniform(0.5)], [&uniform(0.375), &uniform(0.75)]).unwrap();
+        assert_eq!(popping.mean(), Some(0.5));
+        // A constant offset does not pop.
+        popping.add("a", [&uniform(0.0), &uniform(0.5)], [&uniform(0.25), &uniform(0.75)]).unwrap();
+        assert_eq!((popping.mean(), popping.pairs(), popping.still_change()), (Some(0.25), 2, None));
+    }
+
+    #[test]
+    fn pairs_whose_reference_stands_still_are_told_apart() {
+        let mut popping = Popping::default();
+        let still = [&uniform(0.5), &uniform(0.5)];
+        popping.add("a", still, still).unwrap();
+        assert_eq!((popping.mean(), popping.still_pairs(), popping.still_change()), (None, 1, Some(0.0)));
+        popping.add("a", still, [&uniform(0.75), &uniform(0.5)]).unwrap();
+        assert_eq!(popping.mean(), None);
+        assert!((popping.still_change().unwrap() - 0.25 / 2.0_f64.sqrt()).abs() < 1e-15);
+    }
+}
