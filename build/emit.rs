@@ -88,8 +88,8 @@ fn program(out: &mut String, module: &Module, stages: &[&Module]) -> Result<(), 
         for b in &bindings {
             writeln!(
                 w,
-                "Binding {{ name: {:?}, binding: {}, kind: BindingKind::{:?}, readable: {}, writable: {} }},",
-                b.name, b.binding, b.kind, b.readable, b.writable
+                "Binding {{ name: {:?}, binding: {}, kind: BindingKind::{:?}, readable: {}, writable: {}, attachment: {:?} }},",
+                b.name, b.binding, b.kind, b.readable, b.writable, b.attachment
             )?;
         }
         writeln!(w, "], push_constant_size: {push}, group_size: [{x}, {y}, {z}], spec_constants: &[")?;

@@ -20,6 +20,8 @@ pub struct Binding {
     pub kind: Kind,
     pub readable: bool,
     pub writable: bool,
+    /// Index of an input attachment.
+    pub attachment: Option<u32>,
 }
 
 #[derive(Clone, PartialEq, Debug)]
@@ -70,6 +72,7 @@ const NON_READABLE: u32 = 25;
 const BINDING: u32 = 33;
 const DESCRIPTOR_SET: u32 = 34;
 const OFFSET: u32 = 35;
+const INPUT_ATTACHMENT_INDEX: u32 = 43;
 
 pub fn reflect(words: &[u32]) -> Result<Reflection, String> {
     let mut m = Module::default();
@@ -160,6 +163,7 @@ impl Module {
             kind,
             readable: sampled || !has(NON_READABLE),
             writable: !sampled && !has(NON_WRITABLE),
+            attachment: self.decorations.get(&(id, INPUT_ATTACHMENT_INDEX)).copied(),
         })
     }
 

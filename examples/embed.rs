@@ -60,6 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         features: DeviceFeatures::WANTED, // what `create_device` enabled
         interlock,
         attachment_access: false,
+        local_read: false,
         debug_utils: false,
         allocator: None,      // or an engine's own, behind `welkin::gpu::Allocator`
         pipeline_cache: None, // or an engine's own

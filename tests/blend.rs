@@ -314,3 +314,20 @@ fn the_same_scene_gives_the_same_bits_twenty_times() {
         }
     }
 }
+
+#[test]
+fn attachments_hold_what_interlock_holds_by_either_path() {
+    for without in [vec![], vec![Feature::DynamicRenderingLocalRead]] {
+        let mut device = Standalone::new(Options { validation: true, without, ..Options::default() }).unwrap();
+        let mut random = Random(7);
+        let particles: Vec<Particle> = (0..50).map(|_| random.particle(220.0, 150.0)).collect();
+        let picture = draw(&mut device, Blend::Attachment(1), &particles, NO_CLOUD);
+        let error = max_error(&picture, &particles, NO_CLOUD, segments::merged);
+        assert!(error < 2.0 * RAY_ROUNDING, "{error}");
+        println!("{error} {:?}", device.gpu().described_pipelines());
+        if has_interlock(&device) {
+            let other = draw(&mut device, Blend::Interlock(1), &particles, NO_CLOUD);
+            assert!(picture.cloud == other.cloud && picture.nearest == other.nearest);
+        }
+    }
+}

@@ -6,9 +6,11 @@
 //! | mode | how | state per pixel |
 //! |---|---|---|
 //! | [`Interlock`](crate::params::Blend::Interlock) | volume-aware merge in drawing order, ordered by `VK_EXT_fragment_shader_interlock` | 40 bytes |
+//! | [`Attachment`](crate::params::Blend::Attachment) | the same merge, ordered by `VK_EXT_rasterization_order_attachment_access` | 40 bytes |
 //! | [`Alpha`](crate::params::Blend::Alpha) | fixed-function blending of sorted particles; overlap is ignored | none |
 
 mod alpha;
+mod attachment;
 mod interlock;
 pub mod medium;
 
@@ -88,25 +90,32 @@ pub struct Choice {
     pub reason: String,
 }
 
-/// Picks the mode, once. `Auto` takes interlock where there is one, else sorted alpha.
+/// What `auto` tries, the best first: quality, then cost (`docs/blending.md` has both).
+pub const AUTO: &[Blend] = &[Blend::Interlock(1), Blend::Attachment(1), Blend::Alpha];
+
+/// Picks the mode, once. `Auto` takes the first of [`AUTO`] that the device supports.
 ///
 /// # Errors
 /// [`Error::Unsupported`], with the reason, if a mode is asked for by name that the device cannot do.
 pub fn choose(requested: Blend, capabilities: &Capabilities) -> Result<Choice> {
-    let choice = |used, reason: String| Ok(Choice { requested, used, reason });
-    match requested {
-        Blend::Auto => match supports(Blend::Interlock(1), capabilities) {
-            Ok(()) => choice(Blend::Interlock(1), "the device has fragment shader interlock".to_owned()),
-            Err(reason) => choice(Blend::Alpha, format!("no interlock: {reason}")),
-        },
-        mode => match supports(mode, capabilities) {
-            Ok(()) => choice(mode, "as requested".to_owned()),
-            Err(reason) => Err(Error::Unsupported {
-                needed: format!("blend mode {mode} ({reason})"),
-                by: capabilities.device_name.clone(),
-            }),
-        },
+    if requested != Blend::Auto {
+        supports(requested, capabilities).map_err(|reason| Error::Unsupported {
+            needed: format!("blend mode {requested} ({reason})"),
+            by: capabilities.device_name.clone(),
+        })?;
+        return Ok(Choice { requested, used: requested, reason: "as requested".to_owned() });
     }
+    let mut lacking = Vec::new();
+    for &used in AUTO {
+        match supports(used, capabilities) {
+            Ok(()) if lacking.is_empty() => {
+                return Ok(Choice { requested, used, reason: format!("the device has all that {used} needs") });
+            }
+            Ok(()) => return Ok(Choice { requested, used, reason: lacking.join("; ") }),
+            Err(reason) => lacking.push(format!("no {used}: {reason}")),
+        }
+    }
+    Err(Error::Unsupported { needed: lacking.join("; "), by: capabilities.device_name.clone() })
 }
 
 /// Whether a device can run `mode`, or a sentence why not.
@@ -114,6 +123,9 @@ pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> 
     match mode {
         Blend::Auto | Blend::Alpha => Ok(()),
         Blend::Interlock(1) => capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
+        Blend::Attachment(1) => {
+            capabilities.supports(Feature::RasterizationOrderAttachmentAccess).map_err(str::to_owned)
+        }
         other => Err(format!("{other} is not in this version yet")),
     }
 }
@@ -121,6 +133,7 @@ pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> 
 #[allow(clippy::large_enum_variant)] // A renderer has one.
 enum Mode {
     Interlock(interlock::Interlock),
+    Attachment(attachment::AttachmentMode),
     Alpha(alpha::Alpha),
 }
 
@@ -150,6 +163,7 @@ impl Blender {
     pub fn new(gpu: &Arc<Gpu>, mode: Blend, shading: Shading, extent: [u32; 2], precision: Precision) -> Result<Self> {
         let mode = match choose(mode, gpu.capabilities())?.used {
             Blend::Interlock(_) => Mode::Interlock(interlock::Interlock::new(gpu, shading, extent)?),
+            Blend::Attachment(_) => Mode::Attachment(attachment::AttachmentMode::new(gpu, shading, extent)?),
             _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),
         };
         Ok(Self { mode, extent })
@@ -159,6 +173,7 @@ impl Blender {
     pub fn record(&self, rec: &mut Recorder<'_>, inputs: &BlendInputs<'_>, targets: &CloudTargets) -> Result<()> {
         match &self.mode {
             Mode::Interlock(mode) => mode.record(rec, inputs, targets, self.extent),
+            Mode::Attachment(mode) => mode.record(rec, inputs, targets, self.extent),
             Mode::Alpha(mode) => mode.record(rec, inputs, targets, self.extent),
         }
     }

@@ -31,7 +31,7 @@ struct Device {
     /// What keeps Welkin from running on it.
     missing: Vec<String>,
     /// The mode that `auto` takes; none on a device that cannot be used.
-    auto: Option<&'static str>,
+    auto: Option<String>,
     blend: Vec<Mode>,
     timestamps: Answer,
 }
@@ -85,8 +85,11 @@ fn describe(index: usize, device: &Capabilities) -> Device {
         api: device.api.clone(),
         usable: device.missing.is_empty(),
         missing: device.missing.clone(),
-        // The table lists the modes with the best first.
-        auto: blend.iter().find(|mode| mode.answer.supported).map(|mode| mode.mode),
+        auto: if device.missing.is_empty() {
+            welkin::blend::choose(Blend::Auto, device).ok().map(|choice| choice.used.to_string())
+        } else {
+            None
+        },
         blend,
         timestamps: device.supports(Feature::Timestamps).map_err(str::to_owned).into(),
     }
@@ -100,10 +103,7 @@ fn supports(device: &Capabilities, blend: Blend, here: bool) -> Result<(), Strin
     if !here {
         return Err("not in this version of Welkin yet".into());
     }
-    match blend {
-        Blend::Interlock(_) => device.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
-        _ => Ok(()),
-    }
+    welkin::blend::supports(blend, device)
 }
 
 fn text(report: &Report) -> String {
@@ -118,7 +118,7 @@ fn text(report: &Report) -> String {
         for Mode { mode, answer } in &device.blend {
             let _ = writeln!(text, "   {mode:<12} {}", answer_text(answer));
         }
-        let _ = writeln!(text, "   {:<12} {}", "auto", device.auto.map_or("none", |mode| mode));
+        let _ = writeln!(text, "   {:<12} {}", "auto", device.auto.as_deref().unwrap_or("none"));
         let _ = writeln!(text, "   {:<12} {}", "timestamps", answer_text(&device.timestamps));
     }
     for pipeline in report.pipelines.iter().flatten() {

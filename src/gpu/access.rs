@@ -21,6 +21,9 @@ pub enum Access {
     FragmentReadWrite,
     /// Written, and perhaps blended, as a colour attachment.
     ColorAttachment,
+    /// Written as a colour attachment by fragments that read it as an input attachment
+    /// ([`Feedback`](super::Feedback)).
+    AttachmentFeedback,
     /// Read by an indirect command.
     IndirectRead,
     /// Source of a copy.
@@ -35,7 +38,7 @@ pub enum Access {
 
 impl Access {
     /// Every kind, for tables and tests.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::None,
         Self::ComputeRead,
         Self::ComputeWrite,
@@ -44,6 +47,7 @@ impl Access {
         Self::FragmentWrite,
         Self::FragmentReadWrite,
         Self::ColorAttachment,
+        Self::AttachmentFeedback,
         Self::IndirectRead,
         Self::TransferRead,
         Self::TransferWrite,
@@ -65,6 +69,10 @@ impl Access {
             Self::FragmentWrite => (S::FRAGMENT_SHADER, A::SHADER_STORAGE_WRITE),
             Self::FragmentReadWrite => (S::FRAGMENT_SHADER, A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE),
             Self::ColorAttachment => (S::COLOR_ATTACHMENT_OUTPUT, A::COLOR_ATTACHMENT_READ | A::COLOR_ATTACHMENT_WRITE),
+            Self::AttachmentFeedback => (
+                S::FRAGMENT_SHADER | S::COLOR_ATTACHMENT_OUTPUT,
+                A::INPUT_ATTACHMENT_READ | A::COLOR_ATTACHMENT_READ | A::COLOR_ATTACHMENT_WRITE,
+            ),
             Self::IndirectRead => (S::DRAW_INDIRECT, A::INDIRECT_COMMAND_READ),
             Self::TransferRead => (S::ALL_TRANSFER, A::TRANSFER_READ),
             Self::TransferWrite => (S::ALL_TRANSFER, A::TRANSFER_WRITE),
@@ -82,6 +90,7 @@ impl Access {
                 | Self::FragmentWrite
                 | Self::FragmentReadWrite
                 | Self::ColorAttachment
+                | Self::AttachmentFeedback
                 | Self::TransferWrite
                 | Self::HostWrite
         )

@@ -12,6 +12,8 @@ pub enum Feature {
     FragmentShaderInterlock,
     /// `VK_EXT_rasterization_order_attachment_access` for colour attachments.
     RasterizationOrderAttachmentAccess,
+    /// `VK_KHR_dynamic_rendering_local_read`: attachments that a draw writes are read outside render pass objects too.
+    DynamicRenderingLocalRead,
     /// Timestamp queries on the queue in use.
     Timestamps,
 }
@@ -33,12 +35,16 @@ pub struct Capabilities {
     pub max_image_dimension_2d: u32,
     /// Largest extent of a 3D image [texels].
     pub max_image_dimension_3d: u32,
+    /// Attachments that one draw can both write and read: the least of `maxColorAttachments`,
+    /// `maxFragmentOutputAttachments` and `maxPerStageDescriptorInputAttachments`.
+    pub max_feedback_attachments: u32,
     /// Length of a timestamp tick [ns].
     pub timestamp_period: f32,
     /// What keeps Welkin from running on this device at all: empty on a device that will do.
     pub missing: Vec<String>,
     interlock: Result<(), String>,
     attachment_access: Result<(), String>,
+    local_read: Result<(), String>,
     timestamps: Result<(), String>,
     pub(crate) queue_family: u32,
 }
@@ -61,11 +67,13 @@ impl Capabilities {
         let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str().is_ok_and(|n| n == name));
         let has_interlock = has(ash::ext::fragment_shader_interlock::NAME);
         let has_attachment = has(ash::ext::rasterization_order_attachment_access::NAME);
+        let has_local_read = has(ash::khr::dynamic_rendering_local_read::NAME);
 
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
         let mut interlock = vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT::default();
         let mut attachment = vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT::default();
+        let mut local_read = vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR::default();
         let mut features = vk::PhysicalDeviceFeatures2::default();
         if (major, minor) >= (1, 3) {
             features = features.push_next(&mut v12).push_next(&mut v13);
@@ -75,6 +83,9 @@ impl Capabilities {
         }
         if has_attachment {
             features = features.push_next(&mut attachment);
+        }
+        if has_local_read {
+            features = features.push_next(&mut local_read);
         }
         // SAFETY: as above; only structs that the device's version or extensions know are chained.
         unsafe { instance.get_physical_device_features2(physical_device, &mut features) };
@@ -119,6 +130,11 @@ impl Capabilities {
             max_storage_buffer_range: p.limits.max_storage_buffer_range,
             max_image_dimension_2d: p.limits.max_image_dimension2_d,
             max_image_dimension_3d: p.limits.max_image_dimension3_d,
+            max_feedback_attachments: p
+                .limits
+                .max_color_attachments
+                .min(p.limits.max_fragment_output_attachments)
+                .min(p.limits.max_per_stage_descriptor_input_attachments),
             timestamp_period: p.limits.timestamp_period,
             missing,
             interlock: optional(
@@ -132,6 +148,12 @@ impl Capabilities {
                 has_attachment,
                 "rasterizationOrderColorAttachmentAccess",
                 attachment.rasterization_order_color_attachment_access,
+            ),
+            local_read: optional(
+                "VK_KHR_dynamic_rendering_local_read",
+                has_local_read,
+                "dynamicRenderingLocalRead",
+                local_read.dynamic_rendering_local_read,
             ),
             timestamps: if valid_bits > 0 {
                 Ok(())
@@ -147,6 +169,7 @@ impl Capabilities {
         let answer = match feature {
             Feature::FragmentShaderInterlock => &self.interlock,
             Feature::RasterizationOrderAttachmentAccess => &self.attachment_access,
+            Feature::DynamicRenderingLocalRead => &self.local_read,
             Feature::Timestamps => &self.timestamps,
         };
         answer.as_ref().copied().map_err(String::as_str)
@@ -157,6 +180,7 @@ impl Capabilities {
         let slot = match feature {
             Feature::FragmentShaderInterlock => &mut self.interlock,
             Feature::RasterizationOrderAttachmentAccess => &mut self.attachment_access,
+            Feature::DynamicRenderingLocalRead => &mut self.local_read,
             Feature::Timestamps => &mut self.timestamps,
         };
         if slot.is_ok() {

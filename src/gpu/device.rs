@@ -33,6 +33,8 @@ pub struct RawDevice {
     pub interlock: bool,
     /// Whether `rasterizationOrderColorAttachmentAccess` was enabled, with its extension.
     pub attachment_access: bool,
+    /// Whether `dynamicRenderingLocalRead` was enabled, with `VK_KHR_dynamic_rendering_local_read`.
+    pub local_read: bool,
     /// Whether `VK_EXT_debug_utils` was enabled on the instance: objects and passes then get names.
     pub debug_utils: bool,
     /// Source of device memory; none takes `gpu-allocator`. It is dropped with the last user of the device, when every
@@ -73,7 +75,8 @@ impl Gpu {
     /// # Safety
     /// - The handles belong together, and stay valid until the last clone of the returned `Arc` and everything made with
     ///   it are gone (`keep_alive` may hold their owner).
-    /// - The device was created with what `features`, `interlock`, `attachment_access` and `debug_utils` say.
+    /// - The device was created with what `features`, `interlock`, `attachment_access`, `local_read` and `debug_utils`
+    ///   say.
     /// - Recorded commands are submitted to a queue of `queue_family`.
     /// - A lent `pipeline_cache` was not made with `EXTERNALLY_SYNCHRONIZED`, or nobody else uses it while Welkin builds
     ///   pipelines.
@@ -94,6 +97,9 @@ impl Gpu {
         }
         if !raw.attachment_access {
             capabilities.withhold(Feature::RasterizationOrderAttachmentAccess);
+        }
+        if !raw.local_read {
+            capabilities.withhold(Feature::DynamicRenderingLocalRead);
         }
         let allocator = match raw.allocator {
             Some(allocator) => allocator,

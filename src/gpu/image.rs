@@ -29,6 +29,7 @@ pub struct Image {
     view: vk::ImageView,
     extent: [u32; 3],
     format: vk::Format,
+    layers: u32,
     allocation: Option<Allocation>,
     pub(crate) owned: bool,
 }
@@ -36,15 +37,36 @@ pub struct Image {
 impl Image {
     /// A 2D or 3D image with one mip level and one layer.
     pub fn new(gpu: &Arc<Gpu>, desc: &ImageDesc<'_>) -> Result<Self> {
+        let view = if desc.extent[2] > 0 { vk::ImageViewType::TYPE_3D } else { vk::ImageViewType::TYPE_2D };
+        Self::create(gpu, desc, view, 1, vk::SampleCountFlags::TYPE_1)
+    }
+
+    /// An array of `layers` 2D images: `image2DArray` in a shader.
+    pub fn layered(gpu: &Arc<Gpu>, desc: &ImageDesc<'_>, layers: u32) -> Result<Self> {
+        Self::create(gpu, desc, vk::ImageViewType::TYPE_2D_ARRAY, layers, vk::SampleCountFlags::TYPE_1)
+    }
+
+    /// A 2D image with `samples` a pixel, to be drawn into and read in shaders: it cannot be copied to a buffer.
+    pub fn multisampled(gpu: &Arc<Gpu>, desc: &ImageDesc<'_>, samples: vk::SampleCountFlags) -> Result<Self> {
+        Self::create(gpu, desc, vk::ImageViewType::TYPE_2D, 1, samples)
+    }
+
+    fn create(
+        gpu: &Arc<Gpu>,
+        desc: &ImageDesc<'_>,
+        view_type: vk::ImageViewType,
+        layers: u32,
+        samples: vk::SampleCountFlags,
+    ) -> Result<Self> {
         let [width, height, depth] = desc.extent;
-        let volume = depth > 0;
+        let volume = view_type == vk::ImageViewType::TYPE_3D;
         let info = vk::ImageCreateInfo::default()
             .image_type(if volume { vk::ImageType::TYPE_3D } else { vk::ImageType::TYPE_2D })
             .format(desc.format)
             .extent(vk::Extent3D { width, height, depth: depth.max(1) })
             .mip_levels(1)
-            .array_layers(1)
-            .samples(vk::SampleCountFlags::TYPE_1)
+            .array_layers(layers)
+            .samples(samples)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(desc.usage | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST);
         // SAFETY: the device is alive as long as `gpu`, and the description is complete.
@@ -58,6 +80,7 @@ impl Image {
             view: vk::ImageView::null(),
             extent: [width, height, depth.max(1)],
             format: desc.format,
+            layers,
             allocation: None,
             owned: true,
         };
@@ -70,7 +93,7 @@ impl Image {
         bound.map_err(|result| gpu.error("vkBindImageMemory", desc.name, result))?;
         let info = vk::ImageViewCreateInfo::default()
             .image(handle)
-            .view_type(if volume { vk::ImageViewType::TYPE_3D } else { vk::ImageViewType::TYPE_2D })
+            .view_type(view_type)
             .format(desc.format)
             .subresource_range(COLOR);
         // SAFETY: the image is bound to memory and the range is the whole image.
@@ -104,6 +127,7 @@ impl Image {
             view,
             extent: [extent[0], extent[1], 1],
             format,
+            layers: 1,
             allocation: None,
             owned: false,
         }
@@ -127,6 +151,11 @@ impl Image {
     /// Format of a texel.
     pub fn format(&self) -> vk::Format {
         self.format
+    }
+
+    /// Array layers; 1 but for [`Self::layered`] images.
+    pub fn layers(&self) -> u32 {
+        self.layers
     }
 
     /// Name, as debuggers show it.
@@ -156,13 +185,13 @@ impl Drop for Image {
     }
 }
 
-/// The whole of a colour image with one level and one layer.
+/// The whole of a colour image with one level.
 pub(crate) const COLOR: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     aspect_mask: vk::ImageAspectFlags::COLOR,
     base_mip_level: 0,
     level_count: 1,
     base_array_layer: 0,
-    layer_count: 1,
+    layer_count: vk::REMAINING_ARRAY_LAYERS,
 };
 
 /// The samplers that Welkin uses.

@@ -9,6 +9,7 @@ mod buffer;
 mod capabilities;
 mod device;
 mod features;
+mod feedback;
 mod frames;
 mod image;
 mod memory;
@@ -23,6 +24,7 @@ pub use buffer::{Buffer, BufferKind};
 pub use capabilities::{Capabilities, Feature};
 pub use device::{Gpu, RawDevice};
 pub use features::{DeviceFeatures, FEATURES_WANTED, LimitWanted, limits_wanted};
+pub use feedback::{Feedback, FeedbackPath, create_render_pass};
 pub use frames::Frames;
 pub use image::{Image, ImageDesc, Sampled, Sampler};
 pub use memory::{Allocation, Allocator, MemoryLocation, MemoryUse};
@@ -31,5 +33,5 @@ pub use pipeline::{
     PipelineFactory, PipelineKind,
 };
 pub use program::{Binding, BindingKind, BindingSet, Program, Resource, ShaderStage, SpecConstant, Stage};
-pub use recorder::{Draw, Recorder, RecorderState, Target};
+pub use recorder::{Draw, DrawCall, Recorder, RecorderState, Target};
 pub use timing::PassTime;

@@ -1,6 +1,6 @@
 //! Pipelines, first described as data, then built: an engine can print, change, replace or cache each one.
 
-use super::{BindingSet, Gpu, Program, ShaderStage};
+use super::{BindingKind, BindingSet, Feedback, FeedbackPath, Gpu, Program, ShaderStage, create_render_pass};
 use crate::Result;
 use ash::vk;
 use std::fmt;
@@ -35,6 +35,8 @@ pub struct GraphicsState {
     pub samples: vk::SampleCountFlags,
     /// Colour attachments in order.
     pub attachments: Vec<Attachment>,
+    /// Whether and how fragments read the attachments that they write.
+    pub feedback: Option<Feedback>,
 }
 
 impl Default for GraphicsState {
@@ -43,6 +45,7 @@ impl Default for GraphicsState {
             topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
             samples: vk::SampleCountFlags::TYPE_1,
             attachments: Vec::new(),
+            feedback: None,
         }
     }
 }
@@ -109,6 +112,10 @@ impl fmt::Display for PipelineDesc {
                 if self.program.interlock {
                     write!(f, ", pixel interlock")?;
                 }
+                if let Some(Feedback { path, ordered }) = state.feedback {
+                    let order = if ordered { "rasterization-order" } else { "unordered" };
+                    write!(f, ", {order} attachment feedback by {path:?}")?;
+                }
                 for attachment in &state.attachments {
                     write!(f, ", {:?} {:?}", attachment.format, attachment.blend)?;
                 }
@@ -143,7 +150,8 @@ pub trait PipelineFactory: Send + Sync {
 
     /// Builds the pipeline; `layout` has the bindings of `desc.program` in set 0 and its push constants. An engine may
     /// compile elsewhere, look up what it has compiled before, or call [`DefaultFactory`]'s `build`. Viewport and scissor
-    /// are dynamic state. The returned pipeline belongs to Welkin, which destroys it.
+    /// are dynamic state. Pipelines are for dynamic rendering, but those with [`FeedbackPath::Subpass`] for a pass of
+    /// [`create_render_pass`]. The returned pipeline belongs to Welkin, which destroys it.
     fn build(&self, gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<vk::Pipeline> {
         build(gpu, desc, layout)
     }
@@ -174,11 +182,13 @@ impl Pipeline {
             .bindings
             .iter()
             .map(|b| {
+                // Vulkan shows input attachments to fragment shaders alone.
+                let input = b.kind == BindingKind::InputAttachment;
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(b.binding)
                     .descriptor_type(b.kind.descriptor_type())
                     .descriptor_count(1)
-                    .stage_flags(stages)
+                    .stage_flags(if input { vk::ShaderStageFlags::FRAGMENT } else { stages })
             })
             .collect();
         let mut pipeline = Self {
@@ -321,11 +331,14 @@ fn build(gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<v
             let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(state.samples);
             let formats: Vec<_> = state.attachments.iter().map(|attachment| attachment.format).collect();
             let blends: Vec<_> = state.attachments.iter().map(|attachment| attachment.blend.state()).collect();
-            let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
+            let mut blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
+            if state.feedback.is_some_and(|feedback| feedback.ordered) {
+                blend = blend.flags(vk::PipelineColorBlendStateCreateFlags::RASTERIZATION_ORDER_ATTACHMENT_ACCESS_EXT);
+            }
             let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
             let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
             let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
-            let info = vk::GraphicsPipelineCreateInfo::default()
+            let mut info = vk::GraphicsPipelineCreateInfo::default()
                 .stages(&stages)
                 .vertex_input_state(&vertex_input)
                 .input_assembly_state(&assembly)
@@ -334,10 +347,18 @@ fn build(gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<v
                 .multisample_state(&samples)
                 .color_blend_state(&blend)
                 .dynamic_state(&dynamic)
-                .layout(layout)
-                .push_next(&mut rendering);
+                .layout(layout);
+            let mut render_pass = vk::RenderPass::null();
+            if let Some(Feedback { path: FeedbackPath::Subpass, .. }) = state.feedback {
+                render_pass = create_render_pass(gpu, state, 0)?;
+                info = info.render_pass(render_pass);
+            } else {
+                info = info.push_next(&mut rendering);
+            }
             // SAFETY: every referenced object is alive.
             let built = unsafe { device.create_graphics_pipelines(gpu.pipeline_cache(), &[info], None) };
+            // SAFETY: made above; a pipeline outlives the pass that it was built for, and drawing uses a compatible one.
+            unsafe { device.destroy_render_pass(render_pass, None) };
             ("vkCreateGraphicsPipelines", built)
         }
     };

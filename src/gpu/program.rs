@@ -70,6 +70,8 @@ pub struct Binding {
     pub readable: bool,
     /// Whether any stage may write it.
     pub writable: bool,
+    /// The colour attachment that an input attachment reads: its `input_attachment_index`.
+    pub attachment: Option<u32>,
 }
 
 /// The kinds of descriptor that Welkin uses.

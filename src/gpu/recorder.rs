@@ -2,11 +2,13 @@
 //! from what the shaders declare; the order of passes is the order of calls.
 
 use super::access::{Barrier, ResourceState};
+use super::feedback::{FeedbackPath, Framebuffers};
 use super::image::COLOR;
 use super::pipeline::{Pipeline, PipelineKind, check_bindings};
 use super::timing::Timer;
 use super::{
-    Access, BindingSet, Buffer, ComputePipeline, Gpu, GraphicsPipeline, Image, PassTime, Program, Resource, ShaderStage,
+    Access, BindingKind, BindingSet, Buffer, ComputePipeline, Gpu, GraphicsPipeline, GraphicsState, Image, PassTime,
+    Program, Resource, ShaderStage,
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -22,6 +24,7 @@ pub struct RecorderState {
     initialised: HashSet<u64>,
     sets: HashMap<SetKey, vk::DescriptorSet>,
     pools: Vec<vk::DescriptorPool>,
+    framebuffers: Framebuffers,
     timers: Vec<Timer>,
     log: Option<Vec<String>>,
 }
@@ -41,6 +44,7 @@ impl RecorderState {
             initialised: HashSet::new(),
             sets: HashMap::new(),
             pools: Vec::new(),
+            framebuffers: Framebuffers::default(),
             timers: (0..slots).map(|_| Timer::new(gpu)).collect::<Result<_>>()?,
             log: None,
         })
@@ -78,6 +82,7 @@ impl RecorderState {
     pub fn forget(&mut self) {
         self.sets.clear();
         self.resources.clear();
+        self.framebuffers.clear(&self.gpu);
         for pool in self.pools.drain(..) {
             // SAFETY: the device is idle, so no set of the pool is in use.
             unsafe { self.gpu.device().destroy_descriptor_pool(pool, None) };
@@ -130,7 +135,7 @@ impl RecorderState {
             size(vk::DescriptorType::STORAGE_BUFFER, 10),
             size(vk::DescriptorType::STORAGE_IMAGE, 4),
             size(vk::DescriptorType::COMBINED_IMAGE_SAMPLER, 6),
-            size(vk::DescriptorType::INPUT_ATTACHMENT, 2),
+            size(vk::DescriptorType::INPUT_ATTACHMENT, 4),
         ];
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
         // SAFETY: the device is alive as long as `gpu`.
@@ -218,6 +223,19 @@ pub enum Draw<'a> {
         /// Where in it the command lies [bytes].
         offset: u64,
     },
+}
+
+/// One draw of several that share their targets.
+#[derive(Clone, Copy)]
+pub struct DrawCall<'a> {
+    /// What draws.
+    pub pipeline: &'a GraphicsPipeline,
+    /// What it reads and writes through descriptors.
+    pub bindings: &'a dyn BindingSet,
+    /// Its push constants.
+    pub push: &'a [u8],
+    /// How much.
+    pub draw: Draw<'a>,
 }
 
 /// An open command buffer.
@@ -309,16 +327,76 @@ impl Recorder<'_> {
         targets: &[Target<'_>],
         draw: Draw<'_>,
     ) -> Result<()> {
-        let mut extra: Vec<(u64, Access)> = Vec::new();
-        check_targets(pipeline, targets);
+        self.draw_all(extent, targets, &[DrawCall { pipeline, bindings, push: bytemuck::bytes_of(push), draw }])
+    }
+
+    /// Records `calls`, in order, into the same targets: one render pass, with no barrier between them. What one writes
+    /// through descriptors, another may touch only under interlock.
+    ///
+    /// # Panics
+    /// If pipelines are described for other attachments than `targets` or for different ways to read them, or if an input
+    /// attachment is bound to another image than the target of its index.
+    pub fn draw_all(&mut self, extent: [u32; 2], targets: &[Target<'_>], calls: &[DrawCall<'_>]) -> Result<()> {
+        let Some(first) = calls.first() else { return Ok(()) };
+        let state = graphics_state(first.pipeline);
+        let mut uses: Vec<(u64, Access)> = Vec::new();
+        let mut sets = Vec::with_capacity(calls.len());
+        for call in calls {
+            check_targets(call.pipeline, targets);
+            assert_eq!(state.feedback, graphics_state(call.pipeline).feedback, "pipelines of one pass read alike");
+            check_bindings(&call.pipeline.0, call.bindings);
+            let resources = call.bindings.resources();
+            check_inputs(call.pipeline, &resources, targets);
+            self.descriptor_uses(&call.pipeline.0, &resources, &mut uses);
+            if let Draw::Indirect { args, .. } = call.draw {
+                uses.push((args.id, Access::IndirectRead));
+            }
+            sets.push(self.state.descriptor_set(&call.pipeline.0, &resources)?);
+        }
+        let access = if state.feedback.is_some() { Access::AttachmentFeedback } else { Access::ColorAttachment };
         for target in targets {
             self.initialise(target.image);
-            extra.push((target.image.id, Access::ColorAttachment));
+            uses.push((target.image.id, access));
         }
-        if let Draw::Indirect { args, .. } = draw {
-            extra.push((args.id, Access::IndirectRead));
+        let mut seen = HashSet::new();
+        uses.retain(|one| seen.insert(*one));
+        self.transition(first.pipeline.0.desc.program.name, &uses);
+        let [width, height] = extent;
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+        let in_render_pass = state.feedback.is_some_and(|feedback| feedback.path == FeedbackPath::Subpass);
+        if in_render_pass {
+            self.state.framebuffers.begin(&self.state.gpu, self.cmd, state, targets, area)?;
+        } else {
+            self.begin_rendering(targets, area);
         }
-        self.bind(&pipeline.0, bindings, push, vk::PipelineBindPoint::GRAPHICS, &extra)?;
+        let viewport =
+            vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
+        for (call, set) in calls.iter().zip(sets) {
+            self.bind_set(&call.pipeline.0, set, call.push, vk::PipelineBindPoint::GRAPHICS);
+            let device = self.state.gpu.device();
+            // SAFETY: pipeline and descriptors are bound, barriers recorded, attachments in GENERAL layout.
+            unsafe {
+                device.cmd_set_viewport(self.cmd, 0, &[viewport]);
+                device.cmd_set_scissor(self.cmd, 0, &[area]);
+                match call.draw {
+                    Draw::Direct { vertices, instances } => device.cmd_draw(self.cmd, vertices, instances, 0, 0),
+                    Draw::Indirect { args, offset } => device.cmd_draw_indirect(self.cmd, args.handle(), offset, 1, 16),
+                }
+            }
+        }
+        let device = self.state.gpu.device();
+        // SAFETY: closes what was opened above.
+        unsafe {
+            if in_render_pass {
+                device.cmd_end_render_pass(self.cmd);
+            } else {
+                device.cmd_end_rendering(self.cmd);
+            }
+        }
+        Ok(())
+    }
+
+    fn begin_rendering(&mut self, targets: &[Target<'_>], area: vk::Rect2D) {
         let attachments: Vec<_> = targets
             .iter()
             .map(|target| {
@@ -334,24 +412,9 @@ impl Recorder<'_> {
                 }
             })
             .collect();
-        let [width, height] = extent;
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
         let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
-        let viewport =
-            vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
-        let device = self.state.gpu.device();
-        // SAFETY: pipeline and descriptors are bound, barriers recorded, attachments in GENERAL layout.
-        unsafe {
-            device.cmd_begin_rendering(self.cmd, &rendering);
-            device.cmd_set_viewport(self.cmd, 0, &[viewport]);
-            device.cmd_set_scissor(self.cmd, 0, &[area]);
-            match draw {
-                Draw::Direct { vertices, instances } => device.cmd_draw(self.cmd, vertices, instances, 0, 0),
-                Draw::Indirect { args, offset } => device.cmd_draw_indirect(self.cmd, args.handle(), offset, 1, 16),
-            }
-            device.cmd_end_rendering(self.cmd);
-        }
-        Ok(())
+        // SAFETY: the command buffer is recording, outside a render pass; attachments are in GENERAL layout.
+        unsafe { self.state.gpu.device().cmd_begin_rendering(self.cmd, &rendering) };
     }
 
     /// Fills `size` bytes from `offset` with a word.
@@ -440,11 +503,21 @@ impl Recorder<'_> {
         extra: &[(u64, Access)],
     ) -> Result<()> {
         check_bindings(pipeline, bindings);
-        let program = pipeline.desc.program;
         let resources = bindings.resources();
-        let compute = program.stages[0].kind == ShaderStage::Compute;
         let mut uses = extra.to_vec();
-        for (binding, resource) in program.bindings.iter().zip(&resources) {
+        self.descriptor_uses(pipeline, &resources, &mut uses);
+        let set = self.state.descriptor_set(pipeline, &resources)?;
+        self.transition(pipeline.desc.program.name, &uses);
+        self.bind_set(pipeline, set, bytemuck::bytes_of(push), point);
+        Ok(())
+    }
+
+    /// Adds what `pipeline` does to `resources` through descriptors. Input attachments are uses of the targets.
+    fn descriptor_uses(&mut self, pipeline: &Pipeline, resources: &[Resource<'_>], uses: &mut Vec<(u64, Access)>) {
+        let program = pipeline.desc.program;
+        let compute = program.stages[0].kind == ShaderStage::Compute;
+        let descriptors = program.bindings.iter().zip(resources);
+        for (binding, resource) in descriptors.filter(|(binding, _)| binding.kind != BindingKind::InputAttachment) {
             let access = match (compute, binding.readable, binding.writable) {
                 (true, true, true) => Access::ComputeReadWrite,
                 (true, false, true) => Access::ComputeWrite,
@@ -462,21 +535,21 @@ impl Recorder<'_> {
             };
             uses.push((id, access));
         }
-        let set = self.state.descriptor_set(pipeline, &resources)?;
-        self.transition(program.name, &uses);
-        let bytes = bytemuck::bytes_of(push);
+    }
+
+    fn bind_set(&mut self, pipeline: &Pipeline, set: vk::DescriptorSet, push: &[u8], point: vk::PipelineBindPoint) {
+        let program = pipeline.desc.program;
         let size = program.push_constant_size as usize;
-        assert!(bytes.len() >= size, "{}: {} bytes of push constants, expected {size}", program.name, bytes.len());
+        assert!(push.len() >= size, "{}: {} bytes of push constants, expected {size}", program.name, push.len());
         let device = self.state.gpu.device();
         // SAFETY: pipeline, layout and set belong together; the set's resources outlive the commands.
         unsafe {
             device.cmd_bind_pipeline(self.cmd, point, pipeline.handle);
             device.cmd_bind_descriptor_sets(self.cmd, point, pipeline.layout, 0, &[set], &[]);
             if size > 0 {
-                device.cmd_push_constants(self.cmd, pipeline.layout, pipeline.stages, 0, &bytes[..size]);
+                device.cmd_push_constants(self.cmd, pipeline.layout, pipeline.stages, 0, &push[..size]);
             }
         }
-        Ok(())
     }
 
     /// Records the one barrier that must come before a command with these uses.
@@ -545,11 +618,31 @@ impl Recorder<'_> {
     }
 }
 
+fn graphics_state(pipeline: &GraphicsPipeline) -> &GraphicsState {
+    match &pipeline.desc().kind {
+        PipelineKind::Graphics(state) => state,
+        PipelineKind::Compute => panic!("{}: described as compute, drawn as graphics", pipeline.desc().program.name),
+    }
+}
+
+/// Misuse of the interface: an input attachment that is not the target of its index.
+fn check_inputs(pipeline: &GraphicsPipeline, resources: &[Resource<'_>], targets: &[Target<'_>]) {
+    for (binding, resource) in pipeline.desc().program.bindings.iter().zip(resources) {
+        if let (Some(index), Resource::Image(image)) = (binding.attachment, resource) {
+            assert!(
+                targets.get(index as usize).is_some_and(|target| target.image.id == image.id),
+                "{}: input attachment {} is bound to {}, which is not target {index}",
+                pipeline.desc().program.name,
+                binding.name,
+                image.name()
+            );
+        }
+    }
+}
+
 /// Misuse of the interface, or of a [`PipelineFactory`](super::PipelineFactory): attachments of other formats than images.
 fn check_targets(pipeline: &GraphicsPipeline, targets: &[Target<'_>]) {
-    let PipelineKind::Graphics(state) = &pipeline.desc().kind else {
-        panic!("{}: described as compute, drawn as graphics", pipeline.desc().program.name)
-    };
+    let state = graphics_state(pipeline);
     let (described, given): (Vec<_>, Vec<_>) =
         (state.attachments.iter().map(|a| a.format).collect(), targets.iter().map(|t| t.image.format()).collect());
     assert!(
@@ -572,7 +665,7 @@ fn region(image: &Image) -> vk::BufferImageCopy {
             aspect_mask: vk::ImageAspectFlags::COLOR,
             mip_level: 0,
             base_array_layer: 0,
-            layer_count: 1,
+            layer_count: image.layers(),
         })
         .image_extent(vk::Extent3D { width, height, depth })
 }

@@ -78,7 +78,8 @@ impl Standalone {
         let usable = |feature| !options.without.contains(&feature) && capabilities.supports(feature).is_ok();
         let interlock = usable(Feature::FragmentShaderInterlock);
         let attachment_access = usable(Feature::RasterizationOrderAttachmentAccess);
-        let mut setup = DeviceSetup::new(interlock, attachment_access);
+        let local_read = usable(Feature::DynamicRenderingLocalRead);
+        let mut setup = DeviceSetup::new(interlock, attachment_access, local_read);
         if let Some(add) = options.setup {
             add(&instance.raw, physical_device, &mut setup);
         }
@@ -92,6 +93,7 @@ impl Standalone {
             features: DeviceFeatures::WANTED,
             interlock,
             attachment_access,
+            local_read,
             debug_utils: instance.debug.is_some(),
             allocator: None,
             pipeline_cache: None,
@@ -318,7 +320,7 @@ fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice
 /// What a device is created with: [`Options::setup`] may add to it what the device has.
 #[derive(Default)]
 pub struct DeviceSetup {
-    /// Device extensions, each once. The structs of extensions below count only where theirs is in this list.
+    /// Device extensions. The structs of extensions below count only where theirs is in this list.
     pub extensions: Vec<&'static CStr>,
     /// Features of Vulkan 1.0.
     pub core: vk::PhysicalDeviceFeatures,
@@ -338,7 +340,7 @@ pub struct DeviceSetup {
 
 impl DeviceSetup {
     /// What the renderer needs, and the optional features that were asked for.
-    fn new(interlock: bool, attachment_access: bool) -> Self {
+    fn new(interlock: bool, attachment_access: bool, local_read: bool) -> Self {
         let mut setup = Self::default();
         DeviceFeatures::WANTED.enable(&mut setup.core, &mut setup.vulkan12, &mut setup.vulkan13);
         if interlock {
@@ -348,6 +350,10 @@ impl DeviceSetup {
         if attachment_access {
             setup.extensions.push(ash::ext::rasterization_order_attachment_access::NAME);
             setup.attachment_access.rasterization_order_color_attachment_access = vk::TRUE;
+        }
+        if local_read {
+            setup.extensions.push(ash::khr::dynamic_rendering_local_read::NAME);
+            setup.local_read.dynamic_rendering_local_read = vk::TRUE;
         }
         setup
     }
@@ -360,6 +366,8 @@ impl DeviceSetup {
     ) -> Result<ash::Device> {
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
+        self.extensions.sort_unstable();
+        self.extensions.dedup();
         let has = |name: &CStr| self.extensions.contains(&name);
         let (interlock, attachment_access, local_read) = (
             has(ash::ext::fragment_shader_interlock::NAME),

@@ -67,8 +67,8 @@ pub const LIGHTINGS: &[AxisValue<Lighting>] = &[
 pub const BLENDS: &[AxisValue<Blend>] = &[
     here("auto", Blend::Auto),
     here("interlock", Blend::Interlock(1)),
+    here("attachment", Blend::Attachment(1)),
     here("alpha", Blend::Alpha),
-    later("attachment", Blend::Attachment(1)),
     later("list", Blend::List),
     later("tiled", Blend::Tiled),
     later("impostor", Blend::Impostor),
@@ -130,8 +130,8 @@ pub(super) fn validate(params: &Params) -> Result<()> {
     require_here(SOURCES, "clouds.source", |value| *value == source)?;
     require_here(LIGHTINGS, "clouds.lighting", |value| *value == lighting)?;
     require_here(BLENDS, "quality.blend", |value| value.same_kind(&blend))?;
-    if matches!(blend, Blend::Interlock(k) if k != 1) {
-        return Err(not_yet(format!("quality.blend = \"{blend}\""), "interlock with a window of 1"));
+    if matches!(blend, Blend::Interlock(k) | Blend::Attachment(k) if k != 1) {
+        return Err(not_yet(format!("quality.blend = \"{blend}\""), "a window of 1"));
     }
     if !COMBINATIONS.contains(&(source, lighting)) {
         let source_name = name_of(SOURCES, |value| *value == source);

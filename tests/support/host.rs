@@ -116,6 +116,7 @@ impl Host {
             features: self.features,
             interlock: self.interlock,
             attachment_access: false,
+            local_read: false,
             debug_utils: true,
             allocator: None,
             pipeline_cache: None,
