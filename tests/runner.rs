@@ -32,7 +32,7 @@ fn an_unknown_driver_is_an_error_that_names_the_choices() {
     let output = probe("voodoo");
     assert_eq!(output.status.code(), Some(2));
     assert!(
-        stderr(&output).contains("WELKIN_DRIVER=voodoo: expected auto, system, lavapipe or distro"),
+        stderr(&output).contains("WELKIN_DRIVER=voodoo: expected auto, system, lavapipe, distro or swiftshader"),
         "{}",
         stderr(&output)
     );

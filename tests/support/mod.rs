@@ -13,6 +13,8 @@ pub enum Driver {
     Lavapipe,
     /// The distribution's own lavapipe, on Debian 12 a device without interlock.
     Distro,
+    /// SwiftShader, which Chromium brings along: an implementation of its own, without interlock.
+    SwiftShader,
 }
 
 impl Driver {
@@ -22,6 +24,7 @@ impl Driver {
             Self::System => "system",
             Self::Lavapipe => "lavapipe",
             Self::Distro => "distro",
+            Self::SwiftShader => "swiftshader",
         }
     }
 }
@@ -32,6 +35,9 @@ pub fn drivers() -> Vec<Driver> {
     let auto = std::fs::read_to_string(root.join("auto")).unwrap_or_default();
     let mut drivers: Vec<_> = if auto.trim() == "system" { vec![Driver::System] } else { Vec::new() };
     drivers.extend([Driver::Lavapipe, Driver::Distro].into_iter().filter(|d| root.join(d.name()).join("run").exists()));
+    if root.join("chromium/swiftshader.json").exists() {
+        drivers.push(Driver::SwiftShader);
+    }
     drivers
 }
 
