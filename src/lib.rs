@@ -190,6 +190,8 @@ pub mod blend;
 pub mod compact;
 #[cfg(feature = "files")]
 pub mod compare;
+#[cfg(feature = "conform")]
+pub mod conform;
 pub mod density;
 pub mod detail;
 pub mod error;

@@ -26,6 +26,8 @@ pub enum Command {
     Precompute(PrecomputeArgs),
     /// Measure the GPU time of each pass: median and 95th percentile
     Bench(BenchArgs),
+    /// Try what a driver must do for Welkin, check by check; exit status 1 if a check fails
+    Conform(ConformArgs),
 }
 
 #[derive(Args, Debug)]
@@ -147,6 +149,34 @@ pub struct BenchArgs {
     pub warmup: u32,
     #[command(flatten)]
     pub picture: PictureArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct ConformArgs {
+    /// Print JSON (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+    /// Device by part of its name or by its index in `welkin devices`
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Every device present
+    #[arg(long, conflicts_with = "device")]
+    pub all: bool,
+    /// Only checks whose id matches, `*` standing for any text; can be given again
+    #[arg(long, value_name = "GLOB")]
+    pub filter: Vec<String>,
+    /// Print what would be checked, why, and where it is specified
+    #[arg(long)]
+    pub list: bool,
+    /// Small sizes and few repetitions
+    #[arg(long)]
+    pub quick: bool,
+    /// How long a check may take before it counts as hanging [s]
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub timeout: u64,
+    /// Try the checks in this process, from this row on
+    #[arg(long, hide = true, value_name = "ROW")]
+    pub worker: Option<usize>,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]

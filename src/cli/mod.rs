@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod conform;
 mod devices;
 mod places;
 mod precompute;
@@ -19,18 +20,19 @@ use args::{Cli, Command};
 use clap::Parser;
 use welkin::{Error, Result};
 
-/// Parses the command line and runs it. Status 0: done; 2: error. (1 is for comparisons that fail; no command of this
-/// version makes one.)
+/// Parses the command line and runs it. Status 0: done; 1: a check failed; 2: error.
 pub fn main() -> ExitCode {
     let cli = Cli::parse(); // Ends the process with status 2 on a usage error, 0 on --help.
     let outcome = match &cli.command {
-        Command::Devices(args) => devices::run(args),
-        Command::Render(args) => render::run(args),
-        Command::Precompute(args) => precompute::run(args),
-        Command::Bench(args) => bench::run(args),
+        Command::Devices(args) => devices::run(args).map(|()| true),
+        Command::Render(args) => render::run(args).map(|()| true),
+        Command::Precompute(args) => precompute::run(args).map(|()| true),
+        Command::Bench(args) => bench::run(args).map(|()| true),
+        Command::Conform(args) => conform::run(args),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
         Err(error) => {
             eprintln!("welkin: error: {error}");
             ExitCode::from(2)

@@ -294,27 +294,37 @@ impl Drop for Device {
     }
 }
 
-fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, Capabilities)> {
-    let devices = instance.devices()?;
-    let list: Vec<String> = devices.iter().enumerate().map(|(i, (_, c))| format!("{i}: {}", c.device_name)).collect();
+/// Index of the device that `wanted` names, by part of its name or by its index; of the best without a wish.
+///
+/// # Errors
+/// [`Error::Unsupported`] if there is no device at all, [`Error::InvalidParam`] if none is meant.
+pub fn find(devices: &[Capabilities], wanted: Option<&str>) -> Result<usize> {
     let Some(wanted) = wanted else {
         let rank = |c: &Capabilities| {
             let kind = ["discrete", "integrated", "virtual", "cpu", "other"].iter().position(|k| *k == c.device_type);
             (!c.missing.is_empty(), kind, c.supports(Feature::FragmentShaderInterlock).is_err())
         };
-        return devices.into_iter().min_by_key(|(_, c)| rank(c)).ok_or_else(|| Error::Unsupported {
+        let best = devices.iter().enumerate().min_by_key(|(_, c)| rank(c));
+        return best.map(|(index, _)| index).ok_or_else(|| Error::Unsupported {
             needed: "a Vulkan device".to_owned(),
             by: "this system (scripts/setup installs a software one)".to_owned(),
         });
     };
     let index = wanted.parse::<usize>().ok();
-    let found = devices.into_iter().enumerate().find(|(i, (_, c))| match index {
-        Some(index) => *i == index,
+    let found = devices.iter().enumerate().position(|(i, c)| match index {
+        Some(index) => i == index,
         None => c.device_name.to_lowercase().contains(&wanted.to_lowercase()),
     });
-    found.map(|(_, device)| device).ok_or_else(|| {
+    found.ok_or_else(|| {
+        let list: Vec<String> = devices.iter().enumerate().map(|(i, c)| format!("{i}: {}", c.device_name)).collect();
         Error::invalid("--device", wanted, format!("part of the name, or the index, of one of [{}]", list.join("; ")))
     })
+}
+
+fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, Capabilities)> {
+    let (handles, capabilities): (Vec<_>, Vec<_>) = instance.devices()?.into_iter().unzip();
+    let index = find(&capabilities, wanted)?;
+    Ok((handles[index], capabilities[index].clone()))
 }
 
 /// What a device is created with: [`Options::setup`] may add to it what the device has.

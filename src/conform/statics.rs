@@ -1,0 +1,38 @@
+//! Rows that need no device: what Welkin's own shaders ask for, as compiled.
+
+use super::{Check, Group, Interlock, Lab, Sabotage, Spirv, Verdict};
+use crate::gpu::{Program, ShaderStage};
+
+/// One row for each shader that uses interlock.
+pub(super) fn add(list: &mut Vec<Check>) {
+    let ordered = crate::shaders::PROGRAMS.iter().filter(|p| p.interlock && !p.name.starts_with("conform/"));
+    for &program in ordered {
+        let name = program.name.rsplit_once('.').map_or(program.name, |(stem, _)| stem).replace(['/', '_'], "-");
+        let what = format!(
+            "glsl/{} asks for ordered pixel interlock: execution mode, one begin and one end at the top level of its entry \
+             point, no way out between them, everything touched between them coherent",
+            program.name
+        );
+        list.push(
+            Check::new(Group::Static, name, what, move |lab| Ok(check(lab, program)))
+                .why(
+                    "A driver may do anything with a shader that asks wrongly; and a software driver keeps order unasked, \
+                     so no picture of its shows what was asked for",
+                )
+                .spec("SPV_EXT_fragment_shader_interlock; VK_EXT_fragment_shader_interlock"),
+        );
+    }
+}
+
+fn check(lab: &Lab, program: &Program) -> Verdict {
+    let Some(mut module) = Spirv::of(program, ShaderStage::Fragment) else {
+        return Verdict::fail("a fragment shader", "none");
+    };
+    if lab.sabotage() == Some(Sabotage::Unordered) {
+        module = module.without_interlock();
+    }
+    match module.check_interlock(Interlock::PixelOrdered, false) {
+        Ok(()) => Verdict::Pass("asked for once, at the top level".into()),
+        Err(fault) => Verdict::fail("ordered pixel interlock, asked for properly", fault),
+    }
+}
