@@ -24,6 +24,8 @@ pub enum Access {
     /// Written as a colour attachment by fragments that read it as an input attachment
     /// ([`Feedback`](super::Feedback)).
     AttachmentFeedback,
+    /// Tested and written as the depth attachment.
+    DepthAttachment,
     /// Read by an indirect command.
     IndirectRead,
     /// Source of a copy.
@@ -38,7 +40,7 @@ pub enum Access {
 
 impl Access {
     /// Every kind, for tables and tests.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::None,
         Self::ComputeRead,
         Self::ComputeWrite,
@@ -48,6 +50,7 @@ impl Access {
         Self::FragmentReadWrite,
         Self::ColorAttachment,
         Self::AttachmentFeedback,
+        Self::DepthAttachment,
         Self::IndirectRead,
         Self::TransferRead,
         Self::TransferWrite,
@@ -73,6 +76,10 @@ impl Access {
                 S::FRAGMENT_SHADER | S::COLOR_ATTACHMENT_OUTPUT,
                 A::INPUT_ATTACHMENT_READ | A::COLOR_ATTACHMENT_READ | A::COLOR_ATTACHMENT_WRITE,
             ),
+            Self::DepthAttachment => (
+                S::EARLY_FRAGMENT_TESTS | S::LATE_FRAGMENT_TESTS,
+                A::DEPTH_STENCIL_ATTACHMENT_READ | A::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            ),
             Self::IndirectRead => (S::DRAW_INDIRECT, A::INDIRECT_COMMAND_READ),
             Self::TransferRead => (S::ALL_TRANSFER, A::TRANSFER_READ),
             Self::TransferWrite => (S::ALL_TRANSFER, A::TRANSFER_WRITE),
@@ -90,6 +97,7 @@ impl Access {
                 | Self::FragmentWrite
                 | Self::FragmentReadWrite
                 | Self::ColorAttachment
+                | Self::DepthAttachment
                 | Self::AttachmentFeedback
                 | Self::TransferWrite
                 | Self::HostWrite
@@ -132,6 +140,7 @@ impl ResourceState {
 const WRITES: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
     vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw()
         | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw()
+        | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw()
         | vk::AccessFlags2::TRANSFER_WRITE.as_raw()
         | vk::AccessFlags2::HOST_WRITE.as_raw(),
 );

@@ -71,7 +71,18 @@ pub fn create_render_pass(gpu: &Gpu, state: &GraphicsState, clear: u32) -> Resul
         .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
         .color_attachments(&references)
         .input_attachments(&references)];
-    let info = vk::RenderPassCreateInfo2::default().attachments(&attachments).subpasses(&subpasses);
+    // Without order, a barrier inside the pass is what lets one draw read what another has written.
+    let dependencies = [vk::SubpassDependency2::default()
+        .src_subpass(0)
+        .dst_subpass(0)
+        .src_stage_mask(vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT)
+        .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
+        .dst_stage_mask(vk::PipelineStageFlags::FRAGMENT_SHADER)
+        .dst_access_mask(vk::AccessFlags::INPUT_ATTACHMENT_READ)
+        .dependency_flags(vk::DependencyFlags::BY_REGION)];
+    let dependencies = if flags.is_empty() { &dependencies[..] } else { &[] };
+    let info =
+        vk::RenderPassCreateInfo2::default().attachments(&attachments).subpasses(&subpasses).dependencies(dependencies);
     // SAFETY: the device is alive; every pointer in the description is too.
     unsafe { gpu.device().create_render_pass2(&info, None) }
         .map_err(|result| gpu.error("vkCreateRenderPass2", "a pass with attachment feedback", result))

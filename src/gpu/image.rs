@@ -95,7 +95,7 @@ impl Image {
             .image(handle)
             .view_type(view_type)
             .format(desc.format)
-            .subresource_range(COLOR);
+            .subresource_range(image.range());
         // SAFETY: the image is bound to memory and the range is the whole image.
         image.view = unsafe { gpu.device().create_image_view(&info, None) }
             .map_err(|result| gpu.error("vkCreateImageView", desc.name, result))?;
@@ -156,6 +156,16 @@ impl Image {
     /// Array layers; 1 but for [`Self::layered`] images.
     pub fn layers(&self) -> u32 {
         self.layers
+    }
+
+    /// The whole image: its depth, if its format is one of depth alone, else its colour.
+    pub(crate) fn range(&self) -> vk::ImageSubresourceRange {
+        match self.format {
+            vk::Format::D16_UNORM | vk::Format::X8_D24_UNORM_PACK32 | vk::Format::D32_SFLOAT => {
+                vk::ImageSubresourceRange { aspect_mask: vk::ImageAspectFlags::DEPTH, ..COLOR }
+            }
+            _ => COLOR,
+        }
     }
 
     /// Name, as debuggers show it.

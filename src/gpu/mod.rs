@@ -29,9 +29,9 @@ pub use frames::Frames;
 pub use image::{Image, ImageDesc, Sampled, Sampler};
 pub use memory::{Allocation, Allocator, MemoryLocation, MemoryUse};
 pub use pipeline::{
-    Attachment, BlendState, ComputePipeline, DefaultFactory, GraphicsPipeline, GraphicsState, PipelineDesc,
+    Attachment, BlendState, ComputePipeline, DefaultFactory, DepthState, GraphicsPipeline, GraphicsState, PipelineDesc,
     PipelineFactory, PipelineKind,
 };
 pub use program::{Binding, BindingKind, BindingSet, Program, Resource, ShaderStage, SpecConstant, Stage};
-pub use recorder::{Draw, DrawCall, Recorder, RecorderState, Target};
+pub use recorder::{Draw, DrawCall, PassState, Recorder, RecorderState, Target};
 pub use timing::PassTime;

@@ -26,7 +26,7 @@ pub enum PipelineKind {
     Graphics(GraphicsState),
 }
 
-/// Fixed-function state. Viewport and scissor are dynamic, there is no vertex input and no depth attachment.
+/// Fixed-function state. Viewport and scissor are dynamic, there is no vertex input.
 #[derive(Clone, Debug)]
 pub struct GraphicsState {
     /// How vertices make primitives.
@@ -37,6 +37,22 @@ pub struct GraphicsState {
     pub attachments: Vec<Attachment>,
     /// Whether and how fragments read the attachments that they write.
     pub feedback: Option<Feedback>,
+    /// Whether the fragment shader runs for each sample; needs `sampleRateShading`.
+    pub sample_shading: bool,
+    /// The depth test, and with it a depth attachment ([`PassState::depth`](super::PassState)); not with
+    /// [`FeedbackPath::Subpass`].
+    pub depth: Option<DepthState>,
+}
+
+/// A depth test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DepthState {
+    /// Format of the attachment.
+    pub format: vk::Format,
+    /// What a fragment's depth must be to what is there.
+    pub compare: vk::CompareOp,
+    /// Whether fragments that pass leave theirs.
+    pub write: bool,
 }
 
 impl Default for GraphicsState {
@@ -46,6 +62,8 @@ impl Default for GraphicsState {
             samples: vk::SampleCountFlags::TYPE_1,
             attachments: Vec::new(),
             feedback: None,
+            sample_shading: false,
+            depth: None,
         }
     }
 }
@@ -115,6 +133,12 @@ impl fmt::Display for PipelineDesc {
                 if let Some(Feedback { path, ordered }) = state.feedback {
                     let order = if ordered { "rasterization-order" } else { "unordered" };
                     write!(f, ", {order} attachment feedback by {path:?}")?;
+                }
+                if state.sample_shading {
+                    write!(f, ", for each sample")?;
+                }
+                if let Some(DepthState { format, compare, write }) = state.depth {
+                    write!(f, ", depth {format:?} {compare:?}{}", if write { ", written" } else { "" })?;
                 }
                 for attachment in &state.attachments {
                     write!(f, ", {:?} {:?}", attachment.format, attachment.blend)?;
@@ -328,7 +352,16 @@ fn build(gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<v
             let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(state.topology);
             let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
             let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-            let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(state.samples);
+            let samples = vk::PipelineMultisampleStateCreateInfo::default()
+                .rasterization_samples(state.samples)
+                .sample_shading_enable(state.sample_shading)
+                .min_sample_shading(1.0);
+            let depth = state.depth.map(|depth| {
+                vk::PipelineDepthStencilStateCreateInfo::default()
+                    .depth_test_enable(true)
+                    .depth_compare_op(depth.compare)
+                    .depth_write_enable(depth.write)
+            });
             let formats: Vec<_> = state.attachments.iter().map(|attachment| attachment.format).collect();
             let blends: Vec<_> = state.attachments.iter().map(|attachment| attachment.blend.state()).collect();
             let mut blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
@@ -338,6 +371,7 @@ fn build(gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<v
             let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
             let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
             let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+            rendering.depth_attachment_format = state.depth.map_or(vk::Format::UNDEFINED, |depth| depth.format);
             let mut info = vk::GraphicsPipelineCreateInfo::default()
                 .stages(&stages)
                 .vertex_input_state(&vertex_input)
@@ -348,6 +382,9 @@ fn build(gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<v
                 .color_blend_state(&blend)
                 .dynamic_state(&dynamic)
                 .layout(layout);
+            if let Some(depth) = &depth {
+                info = info.depth_stencil_state(depth);
+            }
             let mut render_pass = vk::RenderPass::null();
             if let Some(Feedback { path: FeedbackPath::Subpass, .. }) = state.feedback {
                 render_pass = create_render_pass(gpu, state, 0)?;

@@ -238,6 +238,16 @@ pub struct DrawCall<'a> {
     pub draw: Draw<'a>,
 }
 
+/// What a render pass has beside its colour attachments.
+#[derive(Clone, Copy, Default)]
+pub struct PassState<'a> {
+    /// Depth attachment and the value that it is cleared to; its contents are gone afterwards.
+    pub depth: Option<(&'a Image, f32)>,
+    /// Whether each call may read as input attachments what those before it have written: a barrier between them. Pipelines
+    /// with ordered feedback do without.
+    pub separated: bool,
+}
+
 /// An open command buffer.
 pub struct Recorder<'s> {
     state: &'s mut RecorderState,
@@ -337,6 +347,20 @@ impl Recorder<'_> {
     /// If pipelines are described for other attachments than `targets` or for different ways to read them, or if an input
     /// attachment is bound to another image than the target of its index.
     pub fn draw_all(&mut self, extent: [u32; 2], targets: &[Target<'_>], calls: &[DrawCall<'_>]) -> Result<()> {
+        self.draw_pass(extent, targets, PassState::default(), calls)
+    }
+
+    /// As [`draw_all`](Self::draw_all), in a pass with more `state`.
+    ///
+    /// # Panics
+    /// As [`draw_all`](Self::draw_all).
+    pub fn draw_pass(
+        &mut self,
+        extent: [u32; 2],
+        targets: &[Target<'_>],
+        pass: PassState<'_>,
+        calls: &[DrawCall<'_>],
+    ) -> Result<()> {
         let Some(first) = calls.first() else { return Ok(()) };
         let state = graphics_state(first.pipeline);
         let mut uses: Vec<(u64, Access)> = Vec::new();
@@ -358,6 +382,10 @@ impl Recorder<'_> {
             self.initialise(target.image);
             uses.push((target.image.id, access));
         }
+        if let Some((image, _)) = pass.depth {
+            self.initialise(image);
+            uses.push((image.id, Access::DepthAttachment));
+        }
         let mut seen = HashSet::new();
         uses.retain(|one| seen.insert(*one));
         self.transition(first.pipeline.0.desc.program.name, &uses);
@@ -367,11 +395,14 @@ impl Recorder<'_> {
         if in_render_pass {
             self.state.framebuffers.begin(&self.state.gpu, self.cmd, state, targets, area)?;
         } else {
-            self.begin_rendering(targets, area);
+            self.begin_rendering(targets, pass.depth, area);
         }
         let viewport =
             vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
-        for (call, set) in calls.iter().zip(sets) {
+        for (index, (call, set)) in calls.iter().zip(sets).enumerate() {
+            if pass.separated && index > 0 {
+                self.separate();
+            }
             self.bind_set(&call.pipeline.0, set, call.push, vk::PipelineBindPoint::GRAPHICS);
             let device = self.state.gpu.device();
             // SAFETY: pipeline and descriptors are bound, barriers recorded, attachments in GENERAL layout.
@@ -396,7 +427,21 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    fn begin_rendering(&mut self, targets: &[Target<'_>], area: vk::Rect2D) {
+    /// Inside a pass: what has been written to colour attachments can be read as input attachments of the same pixels.
+    fn separate(&mut self) {
+        let memory = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
+            .src_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::FRAGMENT_SHADER)
+            .dst_access_mask(vk::AccessFlags2::INPUT_ATTACHMENT_READ)];
+        let dependency =
+            vk::DependencyInfo::default().dependency_flags(vk::DependencyFlags::BY_REGION).memory_barriers(&memory);
+        // SAFETY: inside a pass whose pipelines read their attachments, which has this dependency on itself.
+        unsafe { self.state.gpu.device().cmd_pipeline_barrier2(self.cmd, &dependency) };
+        self.log(|| "  barrier within the pass".to_owned());
+    }
+
+    fn begin_rendering(&mut self, targets: &[Target<'_>], depth: Option<(&Image, f32)>, area: vk::Rect2D) {
         let attachments: Vec<_> = targets
             .iter()
             .map(|target| {
@@ -412,7 +457,19 @@ impl Recorder<'_> {
                 }
             })
             .collect();
-        let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
+        let depth = depth.map(|(image, depth)| {
+            vk::RenderingAttachmentInfo::default()
+                .image_view(image.view())
+                .image_layout(vk::ImageLayout::GENERAL)
+                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .store_op(vk::AttachmentStoreOp::DONT_CARE)
+                .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth, stencil: 0 } })
+        });
+        let mut rendering =
+            vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
+        if let Some(depth) = &depth {
+            rendering = rendering.depth_attachment(depth);
+        }
         // SAFETY: the command buffer is recording, outside a render pass; attachments are in GENERAL layout.
         unsafe { self.state.gpu.device().cmd_begin_rendering(self.cmd, &rendering) };
     }
@@ -600,7 +657,7 @@ impl Recorder<'_> {
             .old_layout(old)
             .new_layout(new)
             .image(image.handle())
-            .subresource_range(COLOR)];
+            .subresource_range(image.range())];
         let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
         // SAFETY: the command buffer is recording, outside a render pass; the image is alive.
         unsafe { self.state.gpu.device().cmd_pipeline_barrier2(self.cmd, &dependency) };
