@@ -301,6 +301,7 @@ impl Renderer {
             opaque_distance: &background.low_opaque,
             draw_args: self.compact.args(),
             draw_args_offset: Compact::DRAW_ARGS,
+            counters: self.set.counters(),
         };
         self.blender.record(rec, &blend_inputs, &self.targets)?;
         let cloud = background.record_cloud_air(rec, atmosphere, frame_buffer, &self.targets, cloud_base)?;
@@ -330,6 +331,7 @@ impl Renderer {
         grew |= self.compact.grow(gpu, &self.set)?;
         grew |= self.lighting.grow(gpu, &self.set)?;
         grew |= self.tiling.grow(gpu, &counters, &self.set)?;
+        grew |= self.blender.grow(gpu, &counters)?;
         Ok(grew)
     }
 
@@ -350,6 +352,9 @@ impl Renderer {
         if let Particles::Grid(grid, _) = &self.particles {
             let capacity = grid.valid_cell_capacity();
             lists.push(ListUse { name: "valid_cells", needed: counters.valid_cells, capacity });
+        }
+        if let Some(capacity) = self.blender.node_capacity() {
+            lists.push(ListUse { name: "blend_nodes", needed: counters.blend_nodes, capacity });
         }
         lists
     }

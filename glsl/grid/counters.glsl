@@ -12,6 +12,7 @@ struct Counters {
     uint tile_nodes;  // light list nodes wanted
     uint longest_walk; // light list nodes that one receiver visited, at most
     uint truncated;   // receivers whose walk hit the traversal limit
+    uint blend_nodes; // list nodes that the blend mode wanted
 };
 
 #endif

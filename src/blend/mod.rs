@@ -7,14 +7,17 @@
 //! |---|---|---|
 //! | [`Interlock`](crate::params::Blend::Interlock) | volume-aware merge in drawing order, ordered by `VK_EXT_fragment_shader_interlock` | 40 bytes |
 //! | [`Attachment`](crate::params::Blend::Attachment) | the same merge, ordered by `VK_EXT_rasterization_order_attachment_access` | 40 bytes |
+//! | [`List`](crate::params::Blend::List) | all segments kept, sorted and integrated exactly at resolve | 4 bytes, and 32 for each segment |
 //! | [`Alpha`](crate::params::Blend::Alpha) | fixed-function blending of sorted particles; overlap is ignored | none |
 
 mod alpha;
 mod attachment;
 mod interlock;
+mod list;
 pub mod medium;
 
 use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder, Sampler};
+use crate::grid::Counters;
 use crate::params::{Blend, Lighting, Precision};
 use crate::{Error, Result};
 use ash::vk;
@@ -77,6 +80,8 @@ pub struct BlendInputs<'a> {
     pub draw_args: &'a Buffer,
     /// Where in it the command lies [bytes].
     pub draw_args_offset: u64,
+    /// The frame's [`Counters`]; modes with lists raise [`Counters::blend_nodes`].
+    pub counters: &'a Buffer,
 }
 
 /// Which mode was asked for, which is used, and why.
@@ -121,7 +126,7 @@ pub fn choose(requested: Blend, capabilities: &Capabilities) -> Result<Choice> {
 /// Whether a device can run `mode`, or a sentence why not.
 pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> {
     match mode {
-        Blend::Auto | Blend::Alpha => Ok(()),
+        Blend::Auto | Blend::Alpha | Blend::List => Ok(()),
         Blend::Interlock(1) => capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
         Blend::Attachment(1) => {
             capabilities.supports(Feature::RasterizationOrderAttachmentAccess).map_err(str::to_owned)
@@ -134,6 +139,7 @@ pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> 
 enum Mode {
     Interlock(interlock::Interlock),
     Attachment(attachment::AttachmentMode),
+    List(list::List),
     Alpha(alpha::Alpha),
 }
 
@@ -164,6 +170,7 @@ impl Blender {
         let mode = match choose(mode, gpu.capabilities())?.used {
             Blend::Interlock(_) => Mode::Interlock(interlock::Interlock::new(gpu, shading, extent)?),
             Blend::Attachment(_) => Mode::Attachment(attachment::AttachmentMode::new(gpu, shading, extent)?),
+            Blend::List => Mode::List(list::List::new(gpu, shading, extent, None)?),
             _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),
         };
         Ok(Self { mode, extent })
@@ -174,7 +181,26 @@ impl Blender {
         match &self.mode {
             Mode::Interlock(mode) => mode.record(rec, inputs, targets, self.extent),
             Mode::Attachment(mode) => mode.record(rec, inputs, targets, self.extent),
+            Mode::List(mode) => mode.record(rec, inputs, targets, self.extent),
             Mode::Alpha(mode) => mode.record(rec, inputs, targets, self.extent),
+        }
+    }
+
+    /// Nodes that the mode's list holds; none for a mode without a list.
+    #[must_use]
+    pub fn node_capacity(&self) -> Option<u32> {
+        match &self.mode {
+            Mode::List(mode) => Some(mode.capacity()),
+            Mode::Interlock(_) | Mode::Attachment(_) | Mode::Alpha(_) => None,
+        }
+    }
+
+    /// Makes room for the list nodes that the last frame wanted; the device must be idle. True if there was too little:
+    /// that frame lacks segments.
+    pub fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters) -> Result<bool> {
+        match &mut self.mode {
+            Mode::List(mode) => mode.grow(gpu, counters.blend_nodes),
+            Mode::Interlock(_) | Mode::Attachment(_) | Mode::Alpha(_) => Ok(false),
         }
     }
 }

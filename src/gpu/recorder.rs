@@ -246,6 +246,8 @@ pub struct PassState<'a> {
     /// Whether each call may read as input attachments what those before it have written: a barrier between them. Pipelines
     /// with ordered feedback do without.
     pub separated: bool,
+    /// First row to draw and the first not to; none draws all.
+    pub rows: Option<(u32, u32)>,
 }
 
 /// An open command buffer.
@@ -390,7 +392,11 @@ impl Recorder<'_> {
         uses.retain(|one| seen.insert(*one));
         self.transition(first.pipeline.0.desc.program.name, &uses);
         let [width, height] = extent;
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+        let (first_row, end_row) = pass.rows.unwrap_or((0, height));
+        let area = vk::Rect2D {
+            offset: vk::Offset2D { x: 0, y: first_row as i32 },
+            extent: vk::Extent2D { width, height: end_row - first_row },
+        };
         let in_render_pass = state.feedback.is_some_and(|feedback| feedback.path == FeedbackPath::Subpass);
         if in_render_pass {
             self.state.framebuffers.begin(&self.state.gpu, self.cmd, state, targets, area)?;

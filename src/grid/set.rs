@@ -28,11 +28,14 @@ pub struct Counters {
     pub longest_walk: u32,
     /// Receivers whose walk through a light list hit the traversal limit.
     pub truncated: u32,
+    /// List nodes that the blend mode wanted at one time.
+    pub blend_nodes: u32,
 }
 
 assert_layout!(Counters, counters, {
     cells: CELLS, valid_cells: VALID_CELLS, generated: GENERATED, stored: STORED, visible: VISIBLE,
     tile_nodes: TILE_NODES, longest_walk: LONGEST_WALK, truncated: TRUNCATED,
+    blend_nodes: BLEND_NODES,
 });
 
 impl Counters {

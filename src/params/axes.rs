@@ -69,7 +69,7 @@ pub const BLENDS: &[AxisValue<Blend>] = &[
     here("interlock", Blend::Interlock(1)),
     here("attachment", Blend::Attachment(1)),
     here("alpha", Blend::Alpha),
-    later("list", Blend::List),
+    here("list", Blend::List),
     later("tiled", Blend::Tiled),
     later("impostor", Blend::Impostor),
 ];
