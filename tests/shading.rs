@@ -12,6 +12,7 @@ use welkin::detail::DetailTile;
 use welkin::film::Film;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc};
+use welkin::grid::Counters;
 use welkin::lut::{Detail, TableParams, Tables};
 use welkin::params::{Aim, Blend, Camera, Clouds, Lighting, Precision, Style};
 use welkin::reference::phase::PhaseFunction;
@@ -160,6 +161,7 @@ fn render(
     let film = Film::new(&gpu, [SIZE, SIZE], Precision::F32).unwrap();
     let shading = Shading { lighting: Lighting::Tables, homogeneous: true };
     let blender = Blender::new(&gpu, mode, shading, [SIZE, SIZE], Precision::F32).unwrap();
+    let counters = Buffer::array::<Counters>(&gpu, "counters", 1).unwrap();
     let pixels = (SIZE * SIZE) as usize;
     let bytes = Buffer::new(&gpu, "scene bytes", 16 * pixels as u64, BufferKind::Readback).unwrap();
     let inputs = BlendInputs {
@@ -175,6 +177,7 @@ fn render(
         opaque_distance: &depth,
         draw_args: &args,
         draw_args_offset: 0,
+        counters: &counters,
     };
     device
         .frames()

@@ -4,8 +4,10 @@
 //! The append buffer counts past its capacity and grows between frames ([`List::grow`]). Where it may not grow any more,
 //! the picture is drawn in bands of rows that take turns with it: however many segments a frame has, none is lost.
 
-use super::{BlendInputs, CloudTargets, OPTICAL_DEPTH_SAMPLER, Shading};
-use crate::gpu::{Buffer, ComputePipeline, Draw, DrawCall, Gpu, GraphicsPipeline, GraphicsState, PassState, Recorder, Sampler};
+use super::{BlendInputs, CloudTargets, NodeBudget, OPTICAL_DEPTH_SAMPLER, Shading};
+use crate::gpu::{
+    Buffer, ComputePipeline, Draw, DrawCall, Gpu, GraphicsPipeline, GraphicsState, PassState, Recorder, Sampler,
+};
 use crate::grid::grown;
 use crate::shaders::{blend_list_frag as shader, blend_list_resolve_comp as resolve};
 use crate::shared::assert_layout;
@@ -49,12 +51,13 @@ pub(super) struct List {
 }
 
 impl List {
-    /// Lists for `extent` pixels with `capacity` nodes to begin with; by default some for each pixel.
-    pub(super) fn new(gpu: &Arc<Gpu>, shading: Shading, extent: [u32; 2], capacity: Option<u32>) -> Result<Self> {
+    /// Lists for `extent` pixels.
+    pub(super) fn new(gpu: &Arc<Gpu>, shading: Shading, extent: [u32; 2], budget: NodeBudget) -> Result<Self> {
         let bytes = MOST_BYTES.min(u64::from(gpu.capabilities().max_storage_buffer_range));
         let most = (bytes / size_of::<SegmentNode>() as u64) as u32;
+        let most = budget.most.map_or(most, |wish| wish.clamp(1, most));
         let pixels = extent[0] * extent[1];
-        let capacity = capacity.unwrap_or(pixels.saturating_mul(NODES_PER_PIXEL)).clamp(1, most);
+        let capacity = budget.first.unwrap_or(pixels.saturating_mul(NODES_PER_PIXEL)).clamp(1, most);
         let state = GraphicsState::default();
         Ok(Self {
             pipeline: GraphicsPipeline::new(gpu, &shader::PROGRAM, &shading.specialization(), state)?,
@@ -83,7 +86,10 @@ impl List {
             // Bands are as tall as each other, not as full: the next frame tells whether that was enough.
             if self.bands == self.extent[1] {
                 return Err(Error::Unsupported {
-                    needed: format!("blend mode list with {needed} segments in one row of pixels (it holds {})", self.most),
+                    needed: format!(
+                        "blend mode list with {needed} segments in one row of pixels (it holds {})",
+                        self.most
+                    ),
                     by: gpu.capabilities().device_name.clone(),
                 });
             }

@@ -143,6 +143,15 @@ enum Mode {
     Alpha(alpha::Alpha),
 }
 
+/// Length of the list of a mode that has one [nodes].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeBudget {
+    /// To begin with; by default some for each pixel.
+    pub first: Option<u32>,
+    /// At most: a frame that wants more is drawn in parts. By default what a shader can address, and no more than 512 MiB.
+    pub most: Option<u32>,
+}
+
 /// Draws particles into [`CloudTargets`] by one mode.
 pub struct Blender {
     mode: Mode,
@@ -167,10 +176,22 @@ impl Shading {
 impl Blender {
     /// Pipelines and per-pixel state of `mode` (not `Auto`: see [`choose`]) for targets of `extent` pixels.
     pub fn new(gpu: &Arc<Gpu>, mode: Blend, shading: Shading, extent: [u32; 2], precision: Precision) -> Result<Self> {
+        Self::with_nodes(gpu, mode, shading, extent, precision, NodeBudget::default())
+    }
+
+    /// The same, with a `budget` for the list of a mode that has one.
+    pub fn with_nodes(
+        gpu: &Arc<Gpu>,
+        mode: Blend,
+        shading: Shading,
+        extent: [u32; 2],
+        precision: Precision,
+        budget: NodeBudget,
+    ) -> Result<Self> {
         let mode = match choose(mode, gpu.capabilities())?.used {
             Blend::Interlock(_) => Mode::Interlock(interlock::Interlock::new(gpu, shading, extent)?),
             Blend::Attachment(_) => Mode::Attachment(attachment::AttachmentMode::new(gpu, shading, extent)?),
-            Blend::List => Mode::List(list::List::new(gpu, shading, extent, None)?),
+            Blend::List => Mode::List(list::List::new(gpu, shading, extent, budget)?),
             _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),
         };
         Ok(Self { mode, extent })

@@ -12,6 +12,7 @@ pub mod optical_depth;
 pub mod phase;
 pub mod quadrature;
 pub mod scattering;
+pub mod scene;
 pub mod segments;
 pub mod sphere;
 pub mod tiling;
