@@ -210,6 +210,7 @@ pub mod renderer;
 pub mod scene;
 pub mod shared;
 pub mod tiling;
+pub mod voxelize;
 
 /// Every shader program, as compiled and reflected by the build.
 pub mod shaders {

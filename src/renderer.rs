@@ -218,7 +218,7 @@ impl Renderer {
         let needs_tables = clouds.style != Style::Homogeneous || clouds.lighting != LightingKind::Flat;
         assert!(inputs.tables.is_some() || !needs_tables, "the scene's particles need their tables");
         let tables = inputs.tables.unwrap_or(TableImages { optical_depth: no_table, scattering: no_table, fill: 1.0 });
-        let origin = floating_origin(camera);
+        let origin = floating_origin(camera.position);
         let frame = self.frame_params(camera, origin, tables.fill);
         self.frame[slot].write(0, &[frame]);
 
@@ -383,8 +383,8 @@ impl Renderer {
     }
 }
 
-/// Near the camera, at sea level, on a lattice of 1024 m: positions relative to it are small and change rarely.
-fn floating_origin(camera: &Camera) -> [f64; 3] {
+/// Near a place (the camera), at sea level, on a lattice of 1024 m: positions relative to it are small and change rarely.
+pub(crate) fn floating_origin(near: [f64; 3]) -> [f64; 3] {
     let snap = |x: f64| (x / 1024.0).round() * 1024.0;
-    [snap(camera.position[0]), 0.0, snap(camera.position[2])]
+    [snap(near[0]), 0.0, snap(near[2])]
 }

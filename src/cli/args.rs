@@ -24,6 +24,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Compute the full tables of a scene's cloud medium: into the cache, and as .npy files with a JSON file naming each axis
     Precompute(PrecomputeArgs),
+    /// Write the extinction of a scene's clouds on a grid of voxels, for other renderers (docs/outside-renderers.md)
+    Voxelize(VoxelizeArgs),
     /// Measure the GPU time of each pass: median and 95th percentile
     Bench(BenchArgs),
     /// Try what a driver must do for Welkin, check by check; exit status 1 if a check fails
@@ -125,6 +127,46 @@ pub struct PrecomputeArgs {
     pub reduced: bool,
     #[command(flatten)]
     pub args: SceneArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct VoxelizeArgs {
+    /// Scene file
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// Volume file: .npy holds a dense array of shape (z, y, x), .vdb a sparse OpenVDB grid named density [1/m]
+    ///
+    /// A file of the same name that ends in .json says where the voxels lie, what the medium is and where the scene's
+    /// camera and sun stand (docs/json.md).
+    #[arg(short, long, value_name = "OUT.{npy,vdb}")]
+    pub output: PathBuf,
+    /// Voxels along the longest side
+    #[arg(long, value_name = "N", default_value_t = 256)]
+    pub resolution: u32,
+    /// Box to fill with voxels [m] [default: all particles of a list; of the grid, 5 km around the camera]
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = parse_bounds, allow_hyphen_values = true)]
+    pub bounds: Option<Bounds>,
+    /// Points averaged along each axis of a voxel; more where particles are smaller than voxels
+    #[arg(long, value_name = "S", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub samples: u32,
+    /// Preset of the particle grid; keys of the scene's [quality] still count
+    #[arg(long, value_enum)]
+    pub quality: Option<QualityArg>,
+    #[command(flatten)]
+    pub args: SceneArgs,
+}
+
+/// Least and greatest corner of a box [m].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds(pub [[f64; 3]; 2]);
+
+fn parse_bounds(text: &str) -> Result<Bounds, String> {
+    let expected = "expected six numbers x0,y0,z0,x1,y1,z1 in metres: the least corner, then the greatest";
+    let values: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
+    match values.as_deref() {
+        Some(&[x0, y0, z0, x1, y1, z1]) if x0 < x1 && y0 < y1 && z0 < z1 => Ok(Bounds([[x0, y0, z0], [x1, y1, z1]])),
+        _ => Err(expected.into()),
+    }
 }
 
 #[derive(Args, Debug)]

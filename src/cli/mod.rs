@@ -12,6 +12,7 @@ mod scenes;
 mod session;
 mod summary;
 mod tables;
+mod voxelize;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -27,6 +28,7 @@ pub fn main() -> ExitCode {
         Command::Devices(args) => devices::run(args).map(|()| true),
         Command::Render(args) => render::run(args).map(|()| true),
         Command::Precompute(args) => precompute::run(args).map(|()| true),
+        Command::Voxelize(args) => voxelize::run(args).map(|()| true),
         Command::Bench(args) => bench::run(args).map(|()| true),
         Command::Conform(args) => conform::run(args),
     };

@@ -6,14 +6,19 @@ use welkin::params::{Blend, Params};
 use welkin::scene::{self, Override};
 use welkin::{Error, Result};
 
-use super::args::{PictureArgs, SceneArgs};
+use super::args::{PictureArgs, QualityArg, SceneArgs};
 
 /// The parameters of the scene file at `path` under the flags.
 pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
+    load_with_quality(path, args.quality, &args.scene)
+}
+
+/// The same for commands that make no picture.
+pub fn load_with_quality(path: &Path, quality: Option<QualityArg>, args: &SceneArgs) -> Result<Params> {
     // The preset comes first, so that --set can still change a part of it.
     let preset =
-        args.quality.map(|q| Override { flag: "--quality".into(), assignment: format!("quality.preset={}", q.name()) });
-    let overrides: Vec<_> = preset.into_iter().chain(sets(&args.scene)).collect();
+        quality.map(|q| Override { flag: "--quality".into(), assignment: format!("quality.preset={}", q.name()) });
+    let overrides: Vec<_> = preset.into_iter().chain(sets(args)).collect();
     scene::load(path, &overrides)
 }
 

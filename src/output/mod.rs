@@ -8,14 +8,17 @@ mod npy;
 mod picture;
 mod stats;
 mod table;
+mod vdb;
 
 use std::path::Path;
 
-pub use atomic::write_atomic;
+pub use atomic::{AtomicFile, write_atomic};
+pub use npy::NpyVolume;
 pub(crate) use picture::encode_png;
 pub use picture::{Format, Picture, PngDepth, numbered, transmittance_path};
 pub use stats::{BlendStats, CapacityStats, DeviceStats, FrameStats, ParticleStats, PassStats, Stats, TableStats};
 pub use table::{Axis, AxisValues, Table, write_tables};
+pub use vdb::{LEAF_VOXELS, VdbGrid, VdbWriter};
 
 use crate::{Error, Result};
 

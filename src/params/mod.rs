@@ -9,7 +9,7 @@
 
 mod axes;
 mod camera;
-mod check;
+pub(crate) mod check;
 mod clouds;
 mod quality;
 mod sky;

@@ -4,6 +4,7 @@ pub mod atmosphere;
 pub mod compact;
 pub mod density;
 pub mod detail;
+pub mod extinction;
 pub mod film;
 pub mod grid;
 pub mod lighting;
