@@ -212,14 +212,42 @@ impl Renderer {
     }
 
     fn record_passes(&mut self, rec: &mut Recorder<'_>, inputs: &FrameInputs<'_>) -> Result<()> {
-        let camera = inputs.camera;
-        let (no_table, slot) = (&self.no_table, rec.slot());
         let clouds = &self.params.clouds;
         let needs_tables = clouds.style != Style::Homogeneous || clouds.lighting != LightingKind::Flat;
         assert!(inputs.tables.is_some() || !needs_tables, "the scene's particles need their tables");
+        self.record_scene(rec, inputs.camera, inputs.tables.map_or(1.0, |tables| tables.fill))?;
+        if let Some(lent) = &inputs.opaque_distance {
+            self.background.record_lent(rec, lent.image)?;
+        }
+        let no_table = &self.no_table;
         let tables = inputs.tables.unwrap_or(TableImages { optical_depth: no_table, scattering: no_table, fill: 1.0 });
+        let blend_inputs = BlendInputs {
+            frame: &self.frame[rec.slot()],
+            particles: self.set.particles(),
+            order: self.compact.order(),
+            lights: self.set.lights(),
+            medium: &self.medium,
+            sky_light: self.atmosphere.sky_light(),
+            optical_depth_lut: tables.optical_depth,
+            scattering_lut: tables.scattering,
+            detail_tile: &self.detail.image,
+            opaque_distance: &self.background.low_opaque,
+            draw_args: self.compact.args(),
+            draw_args_offset: Compact::DRAW_ARGS,
+            counters: self.set.counters(),
+        };
+        self.blender.record(rec, &blend_inputs, &self.targets)?;
+        self.record_film(rec)?;
+        self.record_counters(rec);
+        Ok(())
+    }
+
+    /// Everything before the clouds are seen: particles and their light, the air, sky and ground behind. `fill` is that of
+    /// [`TableImages`].
+    pub(crate) fn record_scene(&mut self, rec: &mut Recorder<'_>, camera: &Camera, fill: f32) -> Result<()> {
+        let slot = rec.slot();
         let origin = floating_origin(camera.position);
-        let frame = self.frame_params(camera, origin, tables.fill);
+        let frame = self.frame_params(camera, origin, fill);
         self.frame[slot].write(0, &[frame]);
 
         if !self.detail_filled {
@@ -227,7 +255,7 @@ impl Renderer {
             self.detail_filled = true;
         }
         let to_sun = self.params.sun.to_sun();
-        let occlusion = self.params.clouds.sigma_t * tables.fill * self.params.clouds.xi;
+        let occlusion = self.params.clouds.sigma_t * fill * self.params.clouds.xi;
         let (set, grid) = (&self.set, &mut self.particles);
         let slab = match grid {
             Particles::Grid(grid, design) => {
@@ -273,43 +301,37 @@ impl Renderer {
             Particles::List(_) => None,
         };
         rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid))?;
-        let (frame_buffer, model) = (&self.frame[slot], self.params.sky.model);
-        let cloud_base = match &self.particles {
-            Particles::Grid(..) => self.params.clouds.altitude,
-            Particles::List(list) => list.bounds()[0][1] as f32,
-        };
-        if model == SkyModel::Atmosphere {
+        let (frame_buffer, cloud_base) = (&self.frame[slot], self.cloud_base());
+        if self.params.sky.model == SkyModel::Atmosphere {
             self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera, self.params.clouds.xi)?;
         }
         self.atmosphere.record_luts(rec, frame_buffer, &frame, &self.shadow, cloud_base)?;
         let (atmosphere, background) = (&self.atmosphere, &self.background);
         background.record_opaque(rec, atmosphere, frame_buffer)?;
         background.record(rec, atmosphere, frame_buffer, &self.shadow, cloud_base)?;
-        if let Some(lent) = &inputs.opaque_distance {
-            background.record_lent(rec, lent.image)?;
-        }
-        let blend_inputs = BlendInputs {
-            frame: &self.frame[slot],
-            particles: self.set.particles(),
-            order: self.compact.order(),
-            lights: self.set.lights(),
-            medium: &self.medium,
-            sky_light: atmosphere.sky_light(),
-            optical_depth_lut: tables.optical_depth,
-            scattering_lut: tables.scattering,
-            detail_tile: &self.detail.image,
-            opaque_distance: &background.low_opaque,
-            draw_args: self.compact.args(),
-            draw_args_offset: Compact::DRAW_ARGS,
-            counters: self.set.counters(),
-        };
-        self.blender.record(rec, &blend_inputs, &self.targets)?;
-        let cloud = background.record_cloud_air(rec, atmosphere, frame_buffer, &self.targets, cloud_base)?;
-        let film = &self.film;
-        film.record_composite(rec, cloud, &background.low_opaque, &background.opaque_distance, &background.radiance)?;
-        film.record_tonemap(rec, &self.params.film, model)?;
-        self.counters.record(rec, &self.set);
         Ok(())
+    }
+
+    /// Makes the counts of the frame readable by [`Self::counters`].
+    pub(crate) fn record_counters(&self, rec: &mut Recorder<'_>) {
+        self.counters.record(rec, &self.set);
+    }
+
+    /// Everything after the clouds are in [`Self::targets`]: the air in front, the background behind, the picture.
+    pub(crate) fn record_film(&self, rec: &mut Recorder<'_>) -> Result<()> {
+        let (atmosphere, background, film) = (&self.atmosphere, &self.background, &self.film);
+        let frame = &self.frame[rec.slot()];
+        let cloud = background.record_cloud_air(rec, atmosphere, frame, &self.targets, self.cloud_base())?;
+        film.record_composite(rec, cloud, &background.low_opaque, &background.opaque_distance, &background.radiance)?;
+        film.record_tonemap(rec, &self.params.film, self.params.sky.model)
+    }
+
+    /// Altitude of the lowest clouds [m].
+    pub(crate) fn cloud_base(&self) -> f32 {
+        match &self.particles {
+            Particles::Grid(..) => self.params.clouds.altitude,
+            Particles::List(list) => list.bounds()[0][1] as f32,
+        }
     }
 
     /// Whether a list was too small for the frame in `slot`, which must have ended: it lacks particles or shadows. A host
