@@ -204,6 +204,7 @@ pub mod lut;
 #[cfg(feature = "files")]
 pub mod output;
 pub mod params;
+pub mod pathtrace;
 pub mod reference;
 pub mod renderer;
 #[cfg(feature = "files")]

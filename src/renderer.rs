@@ -61,6 +61,15 @@ pub struct Renderer {
     no_table: Image,
 }
 
+/// Parts of a frame that others than the renderer read.
+pub(crate) struct SceneParts<'a> {
+    pub set: &'a ParticleSet,
+    pub detail: &'a DetailTile,
+    pub atmosphere: &'a Atmosphere,
+    pub shadow: &'a CloudShadow,
+    pub background: &'a Background,
+}
+
 /// Sizes of the lists and what the last frame wanted of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ListUse {
@@ -326,6 +335,17 @@ impl Renderer {
         film.record_tonemap(rec, &self.params.film, self.params.sky.model)
     }
 
+    /// What path tracing needs of the scene that [`Self::record_scene`] has made.
+    pub(crate) fn parts(&self) -> SceneParts<'_> {
+        SceneParts {
+            set: &self.set,
+            detail: &self.detail,
+            atmosphere: &self.atmosphere,
+            shadow: &self.shadow,
+            background: &self.background,
+        }
+    }
+
     /// Altitude of the lowest clouds [m].
     pub(crate) fn cloud_base(&self) -> f32 {
         match &self.particles {
@@ -381,7 +401,7 @@ impl Renderer {
         lists
     }
 
-    fn frame_params(&self, camera: &Camera, origin: [f64; 3], fill: f32) -> FrameParams {
+    pub(crate) fn frame_params(&self, camera: &Camera, origin: [f64; 3], fill: f32) -> FrameParams {
         let basis = camera.basis();
         let f32s = |v: [f64; 3]| v.map(|c| c as f32);
         FrameParams {

@@ -26,6 +26,8 @@ pub enum Command {
     Precompute(PrecomputeArgs),
     /// Write the extinction of a scene's clouds on a grid of voxels, for other renderers (docs/outside-renderers.md)
     Voxelize(VoxelizeArgs),
+    /// Path trace a scene: the unbiased truth of what `render` approximates
+    Reference(ReferenceArgs),
     /// Measure the GPU time of each pass: median and 95th percentile
     Bench(BenchArgs),
     /// Try what a driver must do for Welkin, check by check; exit status 1 if a check fails
@@ -170,6 +172,58 @@ fn parse_bounds(text: &str) -> Result<Bounds, String> {
 }
 
 #[derive(Args, Debug)]
+#[command(group = clap::ArgGroup::new("end").required(true).multiple(true).args(["spp", "noise"]))]
+pub struct ReferenceArgs {
+    /// Scene file
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// Picture file
+    ///
+    /// .png holds the toned picture; .exr and .npy hold linear scene radiance, height x width x 3. The variance of each
+    /// value is written beside it as OUT.variance.exr or OUT.variance.npy, and what is needed to go on as OUT.state.
+    #[arg(short, long, value_name = "OUT.{png,exr,npy}")]
+    pub output: PathBuf,
+    /// Samples of each pixel; with --noise, at most so many
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
+    pub spp: Option<u32>,
+    /// Stop when the relative standard error of the clouds' radiance is at most this, for example 0.01
+    #[arg(long, value_name = "ERROR", value_parser = parse_noise)]
+    pub noise: Option<f64>,
+    /// Size of the picture [pixels]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    pub size: Size,
+    /// Preset of the particle grid; keys of the scene's [quality] still count
+    #[arg(long, value_enum)]
+    pub quality: Option<QualityArg>,
+    /// Another seed is another picture of the same mean
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+    /// The sun on the clouds: one direction, as the tables have it, or its disc
+    #[arg(long, value_enum, default_value_t)]
+    pub sun: SunArg,
+    /// Spread rays over each pixel instead of sending them through its centre
+    #[arg(long)]
+    pub antialias: bool,
+    /// Go on from a state [default: OUT.state]
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "")]
+    pub resume: Option<PathBuf>,
+    /// Write the clouds' transmittance beside the picture, as OUT.transmittance.npy
+    #[arg(long)]
+    pub aux: bool,
+    #[command(flatten)]
+    pub args: SceneArgs,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SunArg {
+    /// One direction
+    #[default]
+    Direction,
+    /// An even disc of the scene's angular radius
+    Disc,
+}
+
+#[derive(Args, Debug)]
 pub struct BenchArgs {
     /// Scene file
     #[arg(value_name = "SCENE.toml")]
@@ -263,6 +317,13 @@ fn parse_size(text: &str) -> Result<Size, String> {
     };
     let size = Size { width: side(width)?, height: side(height)? };
     if u64::from(size.width) * u64::from(size.height) > MAX_PIXELS { Err(expected) } else { Ok(size) }
+}
+
+fn parse_noise(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(noise) if noise > 0.0 && noise < 1.0 => Ok(noise),
+        _ => Err("expected a relative error above 0 and below 1, for example 0.01".into()),
+    }
 }
 
 fn parse_blend(text: &str) -> Result<Blend, String> {

@@ -7,6 +7,7 @@ mod devices;
 mod places;
 mod precompute;
 mod progress;
+mod reference;
 mod render;
 mod scenes;
 mod session;
@@ -29,6 +30,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(args).map(|()| true),
         Command::Precompute(args) => precompute::run(args).map(|()| true),
         Command::Voxelize(args) => voxelize::run(args).map(|()| true),
+        Command::Reference(args) => reference::run(args).map(|()| true),
         Command::Bench(args) => bench::run(args).map(|()| true),
         Command::Conform(args) => conform::run(args),
     };

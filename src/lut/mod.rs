@@ -5,7 +5,7 @@ mod cache;
 mod export;
 mod optical_depth;
 mod scattering;
-mod tables;
+pub(crate) mod tables;
 pub mod transport;
 
 pub use export::{EnergyBalance, ExportAxis, ExportTable};

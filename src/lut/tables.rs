@@ -265,7 +265,7 @@ impl Tables {
 }
 
 /// Mean density along 64 chords through the centre, in directions spread evenly.
-fn central_fill(style: Style, seed: u32) -> f32 {
+pub(crate) fn central_fill(style: Style, seed: u32) -> f32 {
     let n = 64;
     let sum: f64 = (0..n)
         .map(|i| {
