@@ -30,6 +30,8 @@ pub enum Command {
     Reference(ReferenceArgs),
     /// Measure the GPU time of each pass: median and 95th percentile
     Bench(BenchArgs),
+    /// Compare two compositing modes with a reference: pictures, heat maps, metrics, and a report to look at
+    Ab(AbArgs),
     /// Try what a driver must do for Welkin, check by check; exit status 1 if a check fails
     Conform(ConformArgs),
 }
@@ -275,6 +277,60 @@ pub struct ConformArgs {
     pub worker: Option<usize>,
 }
 
+#[derive(Args, Debug)]
+pub struct AbArgs {
+    /// Scene file
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// The mode under test: limits hold for it
+    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
+    pub a: Blend,
+    /// The mode to compare it with
+    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
+    pub b: Blend,
+    /// What both are measured against: exact (tiled or list, whichever the device has), or any mode
+    #[arg(long, value_name = "exact|MODE[:K]", default_value = "exact", value_parser = parse_reference)]
+    pub reference: ReferenceArg,
+    /// Compare frames A to B-1 of the scene's [animation], and measure popping from each to the next
+    #[arg(long, value_name = "A..B", value_parser = parse_frames)]
+    pub frames: Option<FrameRange>,
+    /// Directory for pictures, metrics.json (docs/json.md) and report.html; made if need be
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// End with status 1 if the RMSE of a is above X
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub max_rmse: Option<f64>,
+    /// End with status 1 if the mean FLIP of a is above X
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub max_flip: Option<f64>,
+    /// End with status 1 if the greatest difference of a is above X
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub max_abs: Option<f64>,
+    /// End with status 1 if the popping of a is above X, or has no value because nothing moves
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub max_popping: Option<f64>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+}
+
+/// What `welkin ab` measures against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReferenceArg {
+    /// An exact mode of the device's.
+    Exact,
+    /// This mode.
+    Mode(Blend),
+}
+
+impl std::fmt::Display for ReferenceArg {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Exact => f.write_str("exact"),
+            Self::Mode(blend) => blend.fmt(f),
+        }
+    }
+}
+
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QualityArg {
     /// 4 rings of 104x104 cells, 2 layers
@@ -331,6 +387,18 @@ fn parse_blend(text: &str) -> Result<Blend, String> {
         welkin::Error::InvalidParam { expected, .. } => format!("expected {expected}"),
         other => other.to_string(),
     })
+}
+
+fn parse_reference(text: &str) -> Result<ReferenceArg, String> {
+    match text {
+        "exact" => Ok(ReferenceArg::Exact),
+        mode => parse_blend(mode).map(ReferenceArg::Mode).map_err(|error| format!("{error}, or exact")),
+    }
+}
+
+fn parse_limit(text: &str) -> Result<f64, String> {
+    let limit: Option<f64> = text.parse().ok().filter(|limit: &f64| limit.is_finite() && *limit >= 0.0);
+    limit.ok_or_else(|| "expected a number that is not negative".into())
 }
 
 /// Frames from the first up to, but not including, the last. (A `Vec` or a bare `Range` would mean something else to clap.)

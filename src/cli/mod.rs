@@ -1,5 +1,6 @@
 //! The command line: a thin shell around the library.
 
+mod ab;
 mod args;
 mod bench;
 mod conform;
@@ -22,7 +23,7 @@ use args::{Cli, Command};
 use clap::Parser;
 use welkin::{Error, Result};
 
-/// Parses the command line and runs it. Status 0: done; 1: a check failed; 2: error.
+/// Parses the command line and runs it. Status 0: done; 1: a comparison or check failed; 2: error.
 pub fn main() -> ExitCode {
     let cli = Cli::parse(); // Ends the process with status 2 on a usage error, 0 on --help.
     let outcome = match &cli.command {
@@ -32,6 +33,7 @@ pub fn main() -> ExitCode {
         Command::Voxelize(args) => voxelize::run(args).map(|()| true),
         Command::Reference(args) => reference::run(args).map(|()| true),
         Command::Bench(args) => bench::run(args).map(|()| true),
+        Command::Ab(args) => ab::run(args),
         Command::Conform(args) => conform::run(args),
     };
     match outcome {

@@ -36,10 +36,14 @@ pub fn pictures(scenes: &[PathBuf], output: Option<&Path>) -> Result<Vec<PathBuf
         pictures.push(picture);
     }
     if output.is_some() {
-        std::fs::create_dir_all(directory)
-            .map_err(|error| Error::file(directory, format!("cannot be made: {error}")))?;
+        self::directory(directory)?;
     }
     Ok(pictures)
+}
+
+/// Makes the directory that files are to be written in, if it is not there.
+pub fn directory(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path).map_err(|error| Error::file(path, format!("cannot be made: {error}")))
 }
 
 /// The directory that `file` is to be written in is there.

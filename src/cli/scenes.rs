@@ -15,10 +15,20 @@ pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
 
 /// The same for commands that make no picture.
 pub fn load_with_quality(path: &Path, quality: Option<QualityArg>, args: &SceneArgs) -> Result<Params> {
-    // The preset comes first, so that --set can still change a part of it.
+    load_over(None, path, quality, args)
+}
+
+/// The same with targets of 32-bit floats unless `--set quality.precision` says otherwise: for comparisons.
+pub fn load_precise(path: &Path, args: &PictureArgs) -> Result<Params> {
+    let precision = Override { flag: "--set".into(), assignment: "quality.precision=f32".into() };
+    load_over(Some(precision), path, args.quality, &args.scene)
+}
+
+fn load_over(first: Option<Override>, path: &Path, quality: Option<QualityArg>, args: &SceneArgs) -> Result<Params> {
+    // The preset comes before --set, which can still change a part of it.
     let preset =
         quality.map(|q| Override { flag: "--quality".into(), assignment: format!("quality.preset={}", q.name()) });
-    let overrides: Vec<_> = preset.into_iter().chain(sets(args)).collect();
+    let overrides: Vec<_> = first.into_iter().chain(preset).chain(sets(args)).collect();
     scene::load(path, &overrides)
 }
 

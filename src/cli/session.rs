@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use welkin::blend::supports;
 use welkin::gpu::standalone::{Options, Standalone, validation_available};
 use welkin::gpu::{Buffer, BufferKind, Frames, Image, ImageDesc};
 use welkin::lut::Tables;
 use welkin::output::{BlendStats, CapacityStats, DeviceStats, ParticleStats, PassStats, Picture, TableStats};
-use welkin::params::{Lighting, Params, Precision, Style};
+use welkin::params::{Blend, Lighting, Params, Precision, Style};
 use welkin::renderer::{ListUse, Renderer, TableImages};
 use welkin::{Error, Result};
 
@@ -39,6 +40,11 @@ impl Device {
             driver: capabilities.driver.clone(),
             api: capabilities.api.clone(),
         }
+    }
+
+    /// Whether the device can composite by `mode`, or a sentence why not.
+    pub fn supports(&self, mode: Blend) -> Result<(), String> {
+        supports(mode, self.0.gpu().capabilities())
     }
 
     /// Messages of the validation layer so far; none without the layer. Each is also written to standard error.

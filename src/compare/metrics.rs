@@ -115,11 +115,12 @@ pub struct Popping {
 }
 
 impl Popping {
-    /// Takes in two consecutive frames, each a picture with its reference.
+    /// Takes in two consecutive frames, each a picture with its reference. Returns the value of the pair; none where the
+    /// reference did not change.
     ///
     /// # Errors
     /// [`Error::InvalidParam`] when the sizes differ or a pixel is not finite.
-    pub fn add(&mut self, name: &str, before: [&Picture; 2], after: [&Picture; 2]) -> Result<()> {
+    pub fn add(&mut self, name: &str, before: [&Picture; 2], after: [&Picture; 2]) -> Result<Option<f64>> {
         check(name, before[0], before[1])?;
         check(name, after[0], after[1])?;
         check(name, before[0], after[0])?;
@@ -133,14 +134,15 @@ impl Popping {
             explained += motion * motion;
         }
         if explained > 0.0 {
+            let value = (unexplained / explained).sqrt();
             self.pairs += 1;
-            self.sum += (unexplained / explained).sqrt();
-        } else {
-            self.still_pairs += 1;
-            self.still_squared += unexplained;
-            self.still_values += 3 * before[0].radiance.len() as u64;
+            self.sum += value;
+            return Ok(Some(value));
         }
-        Ok(())
+        self.still_pairs += 1;
+        self.still_squared += unexplained;
+        self.still_values += 3 * before[0].radiance.len() as u64;
+        Ok(None)
     }
 
     /// The mean over the pairs whose reference changed; none if no pair's did.

@@ -6,7 +6,11 @@
 mod flip;
 mod heat;
 mod metrics;
+mod report;
+mod series;
 
 pub use flip::{PIXELS_PER_DEGREE, flip};
 pub use heat::{HeatMap, Scale, magma};
 pub use metrics::{Difference, Errors, Metrics, Popping, REL_MSE_EPSILON};
+pub use report::{Report, ReportSide};
+pub use series::{FrameMetrics, Series, Summary};
