@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::gpu::standalone::{DeviceSetup, Options, Standalone, validation_available};
-use crate::gpu::{Capabilities, Feature, Frames, Gpu};
+use crate::gpu::{Capabilities, Feature, Frames, Gpu, Recorder};
 use ash::vk;
 use std::ffi::CStr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -24,6 +24,8 @@ pub enum Sabotage {
     Expected,
     /// Ordering is not asked for: no interlock in the SPIR-V, no flags of attachment access.
     Unordered,
+    /// The same, and nobody looks at SPIR-V and flags: only hardware that runs fragments side by side shows it.
+    UnorderedUnseen,
     /// What is drawn in order comes in reverse.
     Reversed,
     /// The merge is a commutative one, which every order satisfies.
@@ -32,10 +34,7 @@ pub enum Sabotage {
     Lost,
 }
 
-impl Sabotage {
-    /// Every kind.
-    pub const ALL: [Self; 5] = [Self::Expected, Self::Unordered, Self::Reversed, Self::Commutative, Self::Lost];
-}
+impl Sabotage {}
 
 /// What to open.
 #[derive(Clone, Debug, Default)]
@@ -100,6 +99,14 @@ impl Lab {
         self.device.frames()
     }
 
+    /// Records, submits and waits. Resources may be replaced afterwards.
+    pub(crate) fn submit<T>(&mut self, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<T> {
+        let frames = self.device.frames();
+        let value = frames.run(record)?;
+        frames.state().forget();
+        Ok(value)
+    }
+
     /// What the device is able to.
     pub fn abilities(&self) -> &Abilities {
         &self.abilities
@@ -156,10 +163,10 @@ pub enum Need {
 pub struct Abilities {
     sample_interlock: Option<String>,
     sample_shading: Option<String>,
-    local_read: Option<String>,
     half: Option<String>,
     pixel_interlock: Option<String>,
     attachment_access: Option<String>,
+    local_read: Option<String>,
     timestamps: Option<String>,
     sample_counts: vk::SampleCountFlags,
     colour_sample_counts: vk::SampleCountFlags,
@@ -171,18 +178,13 @@ impl Abilities {
         // SAFETY: the handle came from this instance, here and below.
         let extensions = unsafe { instance.enumerate_device_extension_properties(device) }.unwrap_or_default();
         let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str().is_ok_and(|n| n == name));
-        let (interlock, local) =
-            (has(ash::ext::fragment_shader_interlock::NAME), has(ash::khr::dynamic_rendering_local_read::NAME));
+        let interlock = has(ash::ext::fragment_shader_interlock::NAME);
         let mut interlock_features = vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT::default();
-        let mut local_features = vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Features::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
         let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v11).push_next(&mut v12);
         if interlock {
             features = features.push_next(&mut interlock_features);
-        }
-        if local {
-            features = features.push_next(&mut local_features);
         }
         // SAFETY: only structs that the version or an extension of the device knows are chained.
         unsafe { instance.get_physical_device_features2(device, &mut features) };
@@ -196,8 +198,6 @@ impl Abilities {
                 feature(interlock_features.fragment_shader_sample_interlock, "fragmentShaderSampleInterlock")
             }),
             sample_shading: feature(core.sample_rate_shading, "sampleRateShading"),
-            local_read: extension(local, "VK_KHR_dynamic_rendering_local_read")
-                .or_else(|| feature(local_features.dynamic_rendering_local_read, "dynamicRenderingLocalRead")),
             half: feature(v11.storage_buffer16_bit_access, "storageBuffer16BitAccess")
                 .or_else(|| feature(v12.shader_float16, "shaderFloat16")),
             sample_counts: limits.framebuffer_no_attachments_sample_counts,
@@ -216,10 +216,6 @@ impl Abilities {
         if self.sample_shading.is_none() {
             setup.core.sample_rate_shading = vk::TRUE;
         }
-        if self.local_read.is_none() {
-            setup.local_read.dynamic_rendering_local_read = vk::TRUE;
-            add(&mut setup.extensions, ash::khr::dynamic_rendering_local_read::NAME);
-        }
         if self.half.is_none() {
             setup.vulkan11.storage_buffer16_bit_access = vk::TRUE;
             setup.vulkan12.shader_float16 = vk::TRUE;
@@ -231,6 +227,7 @@ impl Abilities {
         let reason = |feature| capabilities.supports(feature).err().map(str::to_owned);
         self.pixel_interlock = reason(Feature::FragmentShaderInterlock);
         self.attachment_access = reason(Feature::RasterizationOrderAttachmentAccess);
+        self.local_read = reason(Feature::DynamicRenderingLocalRead);
         self.timestamps = reason(Feature::Timestamps);
     }
 

@@ -26,10 +26,16 @@
 //! (`OpBeginInvocationInterlockEXT` and its end once, at the top level of the entry point, with the execution mode) and the
 //! flags of pipeline and subpass. On hardware that runs fragments side by side the pictures prove it too.
 
+mod attachment;
+mod beyond;
 mod glob;
+mod interlock;
 mod lab;
+mod merges;
 mod spirv;
+mod stack;
 mod statics;
+mod variant;
 
 use crate::{Error, Result};
 use std::time::Instant;
@@ -74,6 +80,9 @@ pub struct Outcome {
     pub device_failed: bool,
 }
 
+/// A step of a check: a verdict ends it early, an error the use of the device too.
+type Step<T> = Result<Result<T, Verdict>>;
+
 type Run = dyn Fn(&mut Lab) -> Result<Verdict> + Send + Sync;
 
 /// One row of the matrix.
@@ -90,6 +99,8 @@ pub struct Check {
     pub spec: &'static str,
     /// What a device must have for the check to make sense.
     pub needs: Vec<Need>,
+    /// What, broken on purpose, must make it fail.
+    pub fails_by: Vec<Sabotage>,
     run: Box<Run>,
 }
 
@@ -152,6 +163,7 @@ impl Check {
             why: "",
             spec: "",
             needs: Vec::new(),
+            fails_by: Vec::new(),
             run: Box::new(run),
         }
     }
@@ -174,6 +186,13 @@ impl Check {
     #[must_use]
     pub fn needs(mut self, needs: impl IntoIterator<Item = Need>) -> Self {
         self.needs.extend(needs);
+        self
+    }
+
+    /// Says what, broken on purpose, must make it fail: a test holds it to that.
+    #[must_use]
+    pub fn fails_by(mut self, sabotages: impl IntoIterator<Item = Sabotage>) -> Self {
+        self.fails_by.extend(sabotages);
         self
     }
 
@@ -217,6 +236,9 @@ fn count(n: usize, what: &str) -> String {
 pub fn checks() -> Vec<Check> {
     let mut list = Vec::new();
     statics::add(&mut list);
+    interlock::add(&mut list);
+    beyond::add(&mut list);
+    attachment::add(&mut list);
     list
 }
 
@@ -235,6 +257,7 @@ mod tests {
             for (text, name) in [(check.what.as_str(), "what"), (check.why, "why"), (check.spec, "spec")] {
                 assert!(text.len() > 5, "{}: {name} is missing", check.id);
             }
+            assert!(!check.fails_by.is_empty(), "{}: nothing makes it fail", check.id);
         }
     }
 

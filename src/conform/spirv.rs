@@ -157,6 +157,17 @@ impl Spirv {
         self
     }
 
+    /// The module with the depth test before the shader (`early_fragment_tests`).
+    #[must_use]
+    pub fn with_early_tests(mut self) -> Self {
+        const EARLY_FRAGMENT_TESTS: u32 = 9;
+        if let Some(at) = self.code.iter().position(|i| i.op == OP_EXECUTION_MODE) {
+            let operands = vec![self.code[at].operands[0], EARLY_FRAGMENT_TESTS];
+            self.code.insert(at, Instruction { op: OP_EXECUTION_MODE, operands });
+        }
+        self
+    }
+
     /// The module without any interlock: nothing orders its accesses, nothing keeps them apart.
     #[must_use]
     pub fn without_interlock(mut self) -> Self {

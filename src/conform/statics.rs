@@ -19,7 +19,8 @@ pub(super) fn add(list: &mut Vec<Check>) {
                     "A driver may do anything with a shader that asks wrongly; and a software driver keeps order unasked, \
                      so no picture of its shows what was asked for",
                 )
-                .spec("SPV_EXT_fragment_shader_interlock; VK_EXT_fragment_shader_interlock"),
+                .spec("SPV_EXT_fragment_shader_interlock; VK_EXT_fragment_shader_interlock")
+                .fails_by([Sabotage::Unordered]),
         );
     }
 }
