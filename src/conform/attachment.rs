@@ -233,7 +233,7 @@ fn chained(lab: &mut Lab, way: Way, stack: &Stack, samples: u32, calls: &[Call])
     }
     lab.submit(|rec| {
         let targets = [Target { image: &state, clear: Some([0.0; 4]) }];
-        rec.draw_pass([size; 2], &targets, PassState { depth: None, separated: way.barriers }, &list)?;
+        rec.draw_pass([size; 2], &targets, PassState { separated: way.barriers, ..PassState::default() }, &list)?;
         if samples == 1 {
             rec.copy_image_to_buffer(&state, &readback);
         }

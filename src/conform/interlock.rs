@@ -245,7 +245,7 @@ pub(super) fn draw(
     lab.submit(|rec| {
         rec.clear_image(&image, [0.0; 4]);
         rec.fill_buffer(&buffer, 0, size, 0);
-        let pass = PassState { depth: depth_image.as_ref().map(|image| (image, 1.0)), separated: false };
+        let pass = PassState { depth: depth_image.as_ref().map(|image| (image, 1.0)), ..PassState::default() };
         rec.draw_pass([stack.size; 2], &[], pass, &draws)?;
         if case.in_buffer {
             rec.copy_buffer(&buffer, &readback, size);
