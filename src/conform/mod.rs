@@ -28,6 +28,7 @@
 
 mod attachment;
 mod beyond;
+mod blocks;
 mod glob;
 mod interlock;
 mod lab;
@@ -239,6 +240,7 @@ pub fn checks() -> Vec<Check> {
     interlock::add(&mut list);
     beyond::add(&mut list);
     attachment::add(&mut list);
+    blocks::add(&mut list);
     list
 }
 

@@ -40,6 +40,10 @@ pub struct Capabilities {
     pub max_feedback_attachments: u32,
     /// Length of a timestamp tick [ns].
     pub timestamp_period: f32,
+    /// Bits of a timestamp that count, on the queue in use; 0: it has none.
+    pub timestamp_valid_bits: u32,
+    /// Bits of the weights of linear filtering, at least (`subTexelPrecisionBits`).
+    pub sub_texel_bits: u32,
     /// What keeps Welkin from running on this device at all: empty on a device that will do.
     pub missing: Vec<String>,
     interlock: Result<(), String>,
@@ -136,6 +140,8 @@ impl Capabilities {
                 .min(p.limits.max_fragment_output_attachments)
                 .min(p.limits.max_per_stage_descriptor_input_attachments),
             timestamp_period: p.limits.timestamp_period,
+            timestamp_valid_bits: valid_bits,
+            sub_texel_bits: p.limits.sub_texel_precision_bits,
             missing,
             interlock: optional(
                 "VK_EXT_fragment_shader_interlock",

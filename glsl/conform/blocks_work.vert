@@ -1,0 +1,5 @@
+#version 460
+// The whole screen as one triangle.
+void main() {
+    gl_Position = vec4(vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 4.0 - 1.0, 0.5, 1.0);
+}
