@@ -395,9 +395,7 @@ impl Renderer {
             let capacity = grid.valid_cell_capacity();
             lists.push(ListUse { name: "valid_cells", needed: counters.valid_cells, capacity });
         }
-        if let Some(capacity) = self.blender.node_capacity() {
-            lists.push(ListUse { name: "blend_nodes", needed: counters.blend_nodes, capacity });
-        }
+        lists.extend(self.blender.lists(&counters));
         lists
     }
 

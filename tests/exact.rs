@@ -8,7 +8,7 @@ use welkin::blend::{NO_CLOUD, NodeBudget};
 use welkin::params::Blend;
 use welkin::shared::Particle;
 
-const MODES: &[Blend] = &[Blend::List];
+const MODES: &[Blend] = &[Blend::List, Blend::Tiled];
 
 /// What issue and documentation promise for f32 targets.
 const PROMISED: f64 = 1e-4;

@@ -1,7 +1,6 @@
-// What every mode's fragment shader reads. The vertex shader shares bindings 0 to 2.
+// What every mode reads to make segments. The vertex shader shares bindings 0 and 1, and has the drawing order at 2.
 layout(binding = 0, std430) restrict readonly buffer Frame { FrameParams params; } frame;
 layout(binding = 1, std430) restrict readonly buffer Particles { Particle elements[]; } particles;
-layout(binding = 2, std430) restrict readonly buffer Order { uint indices[]; } order;
 layout(binding = 3, std430) restrict readonly buffer Lights { ParticleLight elements[]; } lights;
 layout(binding = 4, std430) restrict readonly buffer Medium { MediumParams params; } medium;
 layout(binding = 5) uniform sampler3D optical_depth_lut;

@@ -8,7 +8,8 @@ use super::{BlendInputs, CloudTargets, NodeBudget, OPTICAL_DEPTH_SAMPLER, Shadin
 use crate::gpu::{
     Buffer, ComputePipeline, Draw, DrawCall, Gpu, GraphicsPipeline, GraphicsState, PassState, Recorder, Sampler,
 };
-use crate::grid::grown;
+use crate::grid::{Counters, grown};
+use crate::renderer::ListUse;
 use crate::shaders::{blend_list_frag as shader, blend_list_resolve_comp as resolve};
 use crate::shared::assert_layout;
 use crate::{Error, Result};
@@ -72,9 +73,8 @@ impl List {
         })
     }
 
-    /// Nodes that fit.
-    pub(super) fn capacity(&self) -> u32 {
-        self.capacity
+    pub(super) fn lists(&self, counters: &Counters) -> Vec<ListUse> {
+        vec![ListUse { name: "blend_nodes", needed: counters.blend_nodes, capacity: self.capacity }]
     }
 
     /// Makes room for `needed` nodes, by a longer buffer or by more bands that share it. True if that was called for.

@@ -8,6 +8,7 @@
 //! | [`Interlock`](crate::params::Blend::Interlock) | volume-aware merge in drawing order, ordered by `VK_EXT_fragment_shader_interlock` | 40 bytes |
 //! | [`Attachment`](crate::params::Blend::Attachment) | the same merge, ordered by `VK_EXT_rasterization_order_attachment_access` | 40 bytes |
 //! | [`List`](crate::params::Blend::List) | all segments kept, sorted and integrated exactly at resolve | 4 bytes, and 32 for each segment |
+//! | [`Tiled`](crate::params::Blend::Tiled) | compute: particles binned to screen tiles, exact integral front to back | none; 32 bytes for each particle, 16 for each tile it touches |
 //! | [`Alpha`](crate::params::Blend::Alpha) | fixed-function blending of sorted particles; overlap is ignored | none |
 
 mod alpha;
@@ -15,10 +16,12 @@ mod attachment;
 mod interlock;
 mod list;
 pub mod medium;
+mod tiled;
 
 use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder, Sampler};
 use crate::grid::Counters;
 use crate::params::{Blend, Lighting, Precision};
+use crate::renderer::ListUse;
 use crate::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
@@ -126,7 +129,7 @@ pub fn choose(requested: Blend, capabilities: &Capabilities) -> Result<Choice> {
 /// Whether a device can run `mode`, or a sentence why not.
 pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> {
     match mode {
-        Blend::Auto | Blend::Alpha | Blend::List => Ok(()),
+        Blend::Auto | Blend::Alpha | Blend::List | Blend::Tiled => Ok(()),
         Blend::Interlock(1) => capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
         Blend::Attachment(1) => {
             capabilities.supports(Feature::RasterizationOrderAttachmentAccess).map_err(str::to_owned)
@@ -140,6 +143,7 @@ enum Mode {
     Interlock(interlock::Interlock),
     Attachment(attachment::AttachmentMode),
     List(list::List),
+    Tiled(tiled::Tiled),
     Alpha(alpha::Alpha),
 }
 
@@ -192,6 +196,7 @@ impl Blender {
             Blend::Interlock(_) => Mode::Interlock(interlock::Interlock::new(gpu, shading, extent)?),
             Blend::Attachment(_) => Mode::Attachment(attachment::AttachmentMode::new(gpu, shading, extent)?),
             Blend::List => Mode::List(list::List::new(gpu, shading, extent, budget)?),
+            Blend::Tiled => Mode::Tiled(tiled::Tiled::new(gpu, shading, extent, budget)?),
             _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),
         };
         Ok(Self { mode, extent })
@@ -203,16 +208,18 @@ impl Blender {
             Mode::Interlock(mode) => mode.record(rec, inputs, targets, self.extent),
             Mode::Attachment(mode) => mode.record(rec, inputs, targets, self.extent),
             Mode::List(mode) => mode.record(rec, inputs, targets, self.extent),
+            Mode::Tiled(mode) => mode.record(rec, inputs, targets),
             Mode::Alpha(mode) => mode.record(rec, inputs, targets, self.extent),
         }
     }
 
-    /// Nodes that the mode's list holds; none for a mode without a list.
+    /// The lists of the mode, if it has any, and what a frame with these `counters` wanted of them.
     #[must_use]
-    pub fn node_capacity(&self) -> Option<u32> {
+    pub fn lists(&self, counters: &Counters) -> Vec<ListUse> {
         match &self.mode {
-            Mode::List(mode) => Some(mode.capacity()),
-            Mode::Interlock(_) | Mode::Attachment(_) | Mode::Alpha(_) => None,
+            Mode::List(mode) => mode.lists(counters),
+            Mode::Tiled(mode) => mode.lists(counters),
+            Mode::Interlock(_) | Mode::Attachment(_) | Mode::Alpha(_) => Vec::new(),
         }
     }
 
@@ -221,6 +228,7 @@ impl Blender {
     pub fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters) -> Result<bool> {
         match &mut self.mode {
             Mode::List(mode) => mode.grow(gpu, counters.blend_nodes),
+            Mode::Tiled(mode) => mode.grow(gpu, counters),
             Mode::Interlock(_) | Mode::Attachment(_) | Mode::Alpha(_) => Ok(false),
         }
     }

@@ -57,9 +57,22 @@ impl Sort {
         keys: &Buffer,
         indices: &Buffer,
     ) -> Result<()> {
+        self.record_bits(rec, u32::BITS, count, args, keys, indices)
+    }
+
+    /// The same for keys of no more than `bits` bits, in fewer passes.
+    pub fn record_bits(
+        &self,
+        rec: &mut Recorder<'_>,
+        bits: u32,
+        count: (&Buffer, u32),
+        args: (&Buffer, u64),
+        keys: &Buffer,
+        indices: &Buffer,
+    ) -> Result<()> {
         let (sort_count, count_index) = count;
-        // Eight passes: an even number, so the result ends where it began.
-        for pass in 0..8 {
+        // An even number of passes, so the result ends where it began.
+        for pass in 0..2 * bits.div_ceil(8) {
             let (keys_in, indices_in, keys_out, indices_out) = if pass % 2 == 0 {
                 (keys, indices, &self.keys, &self.indices)
             } else {

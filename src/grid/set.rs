@@ -28,7 +28,7 @@ pub struct Counters {
     pub longest_walk: u32,
     /// Receivers whose walk through a light list hit the traversal limit.
     pub truncated: u32,
-    /// List nodes that the blend mode wanted at one time.
+    /// List nodes that the blend mode wanted at one time: segments, or pairs of particle and tile.
     pub blend_nodes: u32,
 }
 

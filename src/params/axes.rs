@@ -70,7 +70,7 @@ pub const BLENDS: &[AxisValue<Blend>] = &[
     here("attachment", Blend::Attachment(1)),
     here("alpha", Blend::Alpha),
     here("list", Blend::List),
-    later("tiled", Blend::Tiled),
+    here("tiled", Blend::Tiled),
     later("impostor", Blend::Impostor),
 ];
 
