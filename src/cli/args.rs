@@ -288,9 +288,15 @@ pub struct AbArgs {
     /// The mode to compare it with
     #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
     pub b: Blend,
-    /// What both are measured against: exact (tiled or list, whichever the device has), or any mode
-    #[arg(long, value_name = "exact|MODE[:K]", default_value = "exact", value_parser = parse_reference)]
+    /// What both are measured against: exact, path, oracle or any mode
+    ///
+    /// exact is tiled or list, whichever the device has; path is path-traced, and its noise is taken into account; oracle
+    /// integrates scenes of homogeneous particles under flat lighting before a black sky in f64.
+    #[arg(long, value_name = "exact|path|…", default_value = "exact", value_parser = parse_reference)]
     pub reference: ReferenceArg,
+    /// Paths a pixel of --reference path [default: 256]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    pub spp: Option<u32>,
     /// Compare frames A to B-1 of the scene's [animation], and measure popping from each to the next
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     pub frames: Option<FrameRange>,
@@ -318,6 +324,10 @@ pub struct AbArgs {
 pub enum ReferenceArg {
     /// An exact mode of the device's.
     Exact,
+    /// Path tracing.
+    Path,
+    /// Integration in f64 on the CPU.
+    Oracle,
     /// This mode.
     Mode(Blend),
 }
@@ -326,6 +336,8 @@ impl std::fmt::Display for ReferenceArg {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Exact => f.write_str("exact"),
+            Self::Path => f.write_str("path"),
+            Self::Oracle => f.write_str("oracle"),
             Self::Mode(blend) => blend.fmt(f),
         }
     }
@@ -392,7 +404,9 @@ fn parse_blend(text: &str) -> Result<Blend, String> {
 fn parse_reference(text: &str) -> Result<ReferenceArg, String> {
     match text {
         "exact" => Ok(ReferenceArg::Exact),
-        mode => parse_blend(mode).map(ReferenceArg::Mode).map_err(|error| format!("{error}, or exact")),
+        "path" => Ok(ReferenceArg::Path),
+        "oracle" => Ok(ReferenceArg::Oracle),
+        mode => parse_blend(mode).map(ReferenceArg::Mode).map_err(|error| format!("{error}, or exact, path, oracle")),
     }
 }
 

@@ -10,6 +10,29 @@ use crate::{Error, Result};
 /// rendering with non-local means filtering*, 2012, whose radiance is of this order).
 pub const REL_MSE_EPSILON: f64 = 0.01;
 
+/// What pictures are measured against.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    /// The picture.
+    pub picture: Picture,
+    /// Variance of each value of its radiance, if it is an estimate such as a path-traced one; noise of different pixels
+    /// and frames is taken to be independent.
+    pub variance: Option<Vec<[f32; 3]>>,
+}
+
+impl From<Picture> for Reference {
+    fn from(picture: Picture) -> Self {
+        Self { picture, variance: None }
+    }
+}
+
+impl Reference {
+    /// Sum of the variance over all values.
+    fn variance_sum(&self) -> f64 {
+        self.variance.iter().flatten().flatten().map(|v| f64::from(*v)).sum()
+    }
+}
+
 /// How far a picture, or a sequence of them, is from its reference. Keys as in `metrics.json` (`docs/comparing.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Metrics {
@@ -23,6 +46,10 @@ pub struct Metrics {
     pub flip_mean: f64,
     /// Greatest difference of linear radiance in any pixel and channel [W m⁻² sr⁻¹ nm⁻¹].
     pub max_abs: f64,
+    /// Root mean square noise of a noisy reference's radiance; none of another.
+    pub noise: Option<f64>,
+    /// `rmse` without the part that is the reference's noise: √max(0, rmse² − noise²). Only with a noisy reference.
+    pub rmse_less_noise: Option<f64>,
 }
 
 /// Sums over the pixels of one picture or of several, from which [`Metrics`] follow.
@@ -34,6 +61,7 @@ pub struct Errors {
     shown_squared: f64,
     flip: f64,
     max_abs: f64,
+    variance: Option<f64>,
 }
 
 /// The difference of a picture from its reference, pixel by pixel and in all.
@@ -52,10 +80,13 @@ impl Difference {
     ///
     /// # Errors
     /// [`Error::InvalidParam`] when the sizes differ or a pixel of either is not finite.
-    pub fn of(name: &str, picture: &Picture, reference: &Picture) -> Result<Self> {
+    pub fn of(name: &str, picture: &Picture, reference: &Reference) -> Result<Self> {
         check(name, picture, reference)?;
+        let variance = reference.variance.as_ref().map(|_| reference.variance_sum());
+        let reference = &reference.picture;
         let flip = flip(&picture.display, &reference.display, picture.width as usize, PIXELS_PER_DEGREE);
-        let mut errors = Errors { pixels: picture.radiance.len() as u64, flip: flip.iter().sum(), ..Errors::default() };
+        let pixels = picture.radiance.len() as u64;
+        let mut errors = Errors { pixels, flip: flip.iter().sum(), variance, ..Errors::default() };
         let mut radiance = Vec::with_capacity(picture.radiance.len());
         for (a, r) in picture.radiance.iter().zip(&reference.radiance) {
             let mut greatest = 0.0f64;
@@ -83,6 +114,9 @@ impl Errors {
         self.shown_squared += other.shown_squared;
         self.flip += other.flip;
         self.max_abs = self.max_abs.max(other.max_abs);
+        if let Some(variance) = other.variance {
+            *self.variance.get_or_insert(0.0) += variance;
+        }
     }
 
     /// The metrics over everything taken in so far; of nothing, zeros.
@@ -96,6 +130,8 @@ impl Errors {
             psnr: (self.shown_squared > 0.0).then(|| -10.0 * (self.shown_squared / values).log10()),
             flip_mean: self.flip / pixels,
             max_abs: self.max_abs,
+            noise: self.variance.map(|variance| (variance / values).sqrt()),
+            rmse_less_noise: self.variance.map(|variance| ((self.squared - variance).max(0.0) / values).sqrt()),
         }
     }
 }
@@ -104,7 +140,8 @@ impl Errors {
 ///
 /// For frames I₀, I₁ and their references R₀, R₁ it is ‖(I₁ − I₀) − (R₁ − R₀)‖ / ‖R₁ − R₀‖ over the linear radiance of all
 /// pixels; over a sequence, the mean of all consecutive pairs. Where the reference does not change at all there is nothing
-/// to relate to: such pairs are counted apart, with the change that the picture made nevertheless.
+/// to relate to: such pairs are counted apart, with the change that the picture made nevertheless. The variance of a noisy
+/// reference is taken off both squares; where nothing is left of its change, the pair counts among those, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Popping {
     sum: f64,
@@ -120,19 +157,29 @@ impl Popping {
     ///
     /// # Errors
     /// [`Error::InvalidParam`] when the sizes differ or a pixel is not finite.
-    pub fn add(&mut self, name: &str, before: [&Picture; 2], after: [&Picture; 2]) -> Result<Option<f64>> {
-        check(name, before[0], before[1])?;
-        check(name, after[0], after[1])?;
-        check(name, before[0], after[0])?;
-        let values = |picture: usize| {
-            let pair = before[picture].radiance.iter().flatten().zip(after[picture].radiance.iter().flatten());
-            pair.map(|(before, after)| f64::from(*after) - f64::from(*before))
+    pub fn add(
+        &mut self,
+        name: &str,
+        before: (&Picture, &Reference),
+        after: (&Picture, &Reference),
+    ) -> Result<Option<f64>> {
+        check(name, before.0, before.1)?;
+        check(name, after.0, after.1)?;
+        if (before.0.width, before.0.height) != (after.0.width, after.0.height) {
+            return Err(Error::invalid(name, "frames of different sizes", "frames of one size"));
+        }
+        let changes = |before: &'_ Picture, after: &'_ Picture| -> Vec<f64> {
+            let pairs = before.radiance.as_flattened().iter().zip(after.radiance.as_flattened());
+            pairs.map(|(before, after)| f64::from(*after) - f64::from(*before)).collect()
         };
-        let (mut unexplained, mut explained) = (0.0, 0.0);
-        for (change, motion) in values(0).zip(values(1)) {
+        let noise = before.1.variance_sum() + after.1.variance_sum();
+        let (mut unexplained, mut explained) = (-noise, -noise);
+        let motions = changes(&before.1.picture, &after.1.picture);
+        for (change, motion) in changes(before.0, after.0).into_iter().zip(motions) {
             unexplained += (change - motion).powi(2);
             explained += motion * motion;
         }
+        let unexplained = unexplained.max(0.0);
         if explained > 0.0 {
             let value = (unexplained / explained).sqrt();
             self.pairs += 1;
@@ -141,7 +188,7 @@ impl Popping {
         }
         self.still_pairs += 1;
         self.still_squared += unexplained;
-        self.still_values += 3 * before[0].radiance.len() as u64;
+        self.still_values += 3 * before.0.radiance.len() as u64;
         Ok(None)
     }
 
@@ -171,15 +218,22 @@ impl Popping {
 }
 
 /// Refuses what cannot be compared: other sizes, values that are not finite.
-fn check(name: &str, picture: &Picture, reference: &Picture) -> Result<()> {
-    if (picture.width, picture.height) != (reference.width, reference.height) {
+fn check(name: &str, picture: &Picture, reference: &Reference) -> Result<()> {
+    let truth = &reference.picture;
+    if (picture.width, picture.height) != (truth.width, truth.height) {
         let size = format!("{}x{}", picture.width, picture.height);
-        let expected = format!("the size of its reference, {}x{}", reference.width, reference.height);
+        let expected = format!("the size of its reference, {}x{}", truth.width, truth.height);
         return Err(Error::invalid(name, size, expected));
     }
-    for (name, picture) in [(name, picture), ("reference", reference)] {
+    for (name, picture) in [(name, picture), ("reference", truth)] {
         if let Some(fault) = picture.fault() {
             return Err(Error::invalid(name, fault, "a picture of finite values"));
+        }
+    }
+    if let Some(variance) = &reference.variance {
+        assert_eq!(variance.len(), truth.radiance.len(), "one variance a value");
+        if let Some(bad) = variance.iter().flatten().find(|v| !(v.is_finite() && **v >= 0.0)) {
+            return Err(Error::invalid("reference", format!("a variance of {bad}"), "finite variances from 0"));
         }
     }
     Ok(())
@@ -200,7 +254,17 @@ mod tests {
     }
 
     fn metrics(a: &Picture, r: &Picture) -> Metrics {
-        Difference::of("a", a, r).unwrap().errors.metrics()
+        difference(a, r).unwrap().errors.metrics()
+    }
+
+    fn difference(a: &Picture, r: &Picture) -> Result<Difference> {
+        Difference::of("a", a, &r.clone().into())
+    }
+
+    /// Popping's `add` of pictures with references free of noise.
+    fn add(popping: &mut Popping, before: [&Picture; 2], after: [&Picture; 2]) -> Result<Option<f64>> {
+        let [r0, r1] = [before[1], after[1]].map(|picture| Reference::from(picture.clone()));
+        popping.add("a", (before[0], &r0), (after[0], &r1))
     }
 
     #[test]
@@ -220,7 +284,7 @@ mod tests {
         let m = metrics(&wrong, &reference);
         assert!((m.rmse - 2.0 / (3.0 * 32.0_f64).sqrt()).abs() < 1e-15);
         assert_eq!((m.max_abs, m.psnr, m.flip_mean), (2.0, None, 0.0)); // What is shown is the same.
-        let difference = Difference::of("a", &wrong, &reference).unwrap();
+        let difference = difference(&wrong, &reference).unwrap();
         assert_eq!(difference.radiance.iter().filter(|d| **d > 0.0).count(), 1);
         assert_eq!(difference.radiance[5], 2.0);
     }
@@ -229,13 +293,14 @@ mod tests {
     fn equal_pictures_differ_in_nothing() {
         let a = picture(8, 4, |x, y| [x as f32 / 8.0, y as f32, 0.3]);
         let m = metrics(&a, &a);
-        assert_eq!(m, Metrics { rmse: 0.0, rel_mse: 0.0, psnr: None, flip_mean: 0.0, max_abs: 0.0 });
+        assert_eq!((m.rmse, m.rel_mse, m.psnr, m.flip_mean, m.max_abs), (0.0, 0.0, None, 0.0, 0.0));
+        assert_eq!((m.noise, m.rmse_less_noise), (None, None));
     }
 
     #[test]
     fn sequences_are_averaged_over_all_pixels() {
-        let mut sum = Difference::of("a", &uniform(0.75), &uniform(0.5)).unwrap().errors;
-        sum.add(&Difference::of("a", &uniform(0.5), &uniform(0.5)).unwrap().errors);
+        let mut sum = difference(&uniform(0.75), &uniform(0.5)).unwrap().errors;
+        sum.add(&difference(&uniform(0.5), &uniform(0.5)).unwrap().errors);
         let m = sum.metrics();
         assert!((m.rmse - 0.25 / 2.0_f64.sqrt()).abs() < 1e-15);
         assert!((m.psnr.unwrap() - 10.0 * 32.0_f64.log10()).abs() < 1e-12);
@@ -248,18 +313,17 @@ mod tests {
         for (which, bad) in [f32::NAN, f32::INFINITY].into_iter().enumerate() {
             let mut wrong = good.clone();
             wrong.radiance[11][2] = bad;
-            let message = Difference::of("b", &wrong, &good).unwrap_err().to_string();
+            let message = difference(&wrong, &good).unwrap_err().to_string();
             assert!(
-                message.starts_with("b = radiance is not finite in 1 pixels, first at column 3, row 1"),
+                message.starts_with("a = radiance is not finite in 1 pixels, first at column 3, row 1"),
                 "{message}"
             );
-            let message = Difference::of("b", &good, &wrong).unwrap_err().to_string();
+            let message = difference(&good, &wrong).unwrap_err().to_string();
             assert!(message.starts_with("reference = "), "{which}: {message}");
-            let pair = [&good, &wrong];
-            assert!(Popping::default().add("b", [&good, &good], pair).is_err());
+            assert!(add(&mut Popping::default(), [&good, &good], [&good, &wrong]).is_err());
         }
-        let message = Difference::of("b", &good, &picture(4, 8, |_, _| [0.5; 3])).unwrap_err().to_string();
-        assert_eq!(message, "b = 8x4: expected the size of its reference, 4x8");
+        let message = difference(&good, &picture(4, 8, |_, _| [0.5; 3])).unwrap_err().to_string();
+        assert_eq!(message, "a = 8x4: expected the size of its reference, 4x8");
     }
 
     #[test]
@@ -267,10 +331,10 @@ mod tests {
         let mut popping = Popping::default();
         assert_eq!(popping.mean(), None);
         // The reference brightens by 0.25 a value, the picture by 0.375: half of the motion too much.
-        popping.add("a", [&uniform(0.0), &uniform(0.5)], [&uniform(0.375), &uniform(0.75)]).unwrap();
+        add(&mut popping, [&uniform(0.0), &uniform(0.5)], [&uniform(0.375), &uniform(0.75)]).unwrap();
         assert_eq!(popping.mean(), Some(0.5));
         // A constant offset does not pop.
-        popping.add("a", [&uniform(0.0), &uniform(0.5)], [&uniform(0.25), &uniform(0.75)]).unwrap();
+        add(&mut popping, [&uniform(0.0), &uniform(0.5)], [&uniform(0.25), &uniform(0.75)]).unwrap();
         assert_eq!((popping.mean(), popping.pairs(), popping.still_change()), (Some(0.25), 2, None));
     }
 
@@ -278,10 +342,29 @@ mod tests {
     fn pairs_whose_reference_stands_still_are_told_apart() {
         let mut popping = Popping::default();
         let still = [&uniform(0.5), &uniform(0.5)];
-        popping.add("a", still, still).unwrap();
+        add(&mut popping, still, still).unwrap();
         assert_eq!((popping.mean(), popping.still_pairs(), popping.still_change()), (None, 1, Some(0.0)));
-        popping.add("a", still, [&uniform(0.75), &uniform(0.5)]).unwrap();
+        add(&mut popping, still, [&uniform(0.75), &uniform(0.5)]).unwrap();
         assert_eq!(popping.mean(), None);
         assert!((popping.still_change().unwrap() - 0.25 / 2.0_f64.sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_references_noise_is_taken_off() {
+        let noisy = |value: f32| Reference { picture: uniform(value), variance: Some(vec![[0.0225; 3]; 32]) };
+        let m = Difference::of("a", &uniform(0.75), &noisy(0.5)).unwrap().errors.metrics();
+        assert!((m.noise.unwrap() - 0.15).abs() < 1e-6 && m.rmse == 0.25); // 0.0225 is rounded to f32.
+        assert!((m.rmse_less_noise.unwrap() - 0.2).abs() < 1e-6); // 0.25² = 0.15² + 0.2²
+        let m = Difference::of("a", &uniform(0.5), &noisy(0.5)).unwrap().errors.metrics();
+        assert_eq!(m.rmse_less_noise, Some(0.0));
+
+        let mut popping = Popping::default();
+        // Squares per value: 1 less 0.045 is explained, 0.25 less 0.045 is not.
+        popping.add("a", (&uniform(0.0), &noisy(0.0)), (&uniform(0.5), &noisy(1.0))).unwrap();
+        assert!((popping.mean().unwrap() - (0.205_f64 / 0.955).sqrt()).abs() < 1e-6);
+        popping.add("a", (&uniform(0.0), &noisy(0.0)), (&uniform(0.0), &noisy(0.125))).unwrap(); // Lost in the noise.
+        assert_eq!((popping.pairs(), popping.still_pairs()), (1, 1));
+        let bad = Reference { picture: uniform(0.5), variance: Some(vec![[-1.0; 3]; 32]) };
+        assert!(Difference::of("a", &uniform(0.5), &bad).unwrap_err().to_string().contains("a variance of -1"));
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::metrics::{Difference, Errors, Metrics, Popping};
+use super::metrics::{Difference, Errors, Metrics, Popping, Reference};
 use crate::Result;
 use crate::output::Picture;
 
@@ -15,7 +15,7 @@ pub struct Series {
     errors: Errors,
     popping: Popping,
     frames: Vec<FrameMetrics>,
-    last: Option<[Arc<Picture>; 2]>,
+    last: Option<(Arc<Picture>, Arc<Reference>)>,
 }
 
 /// The metrics of one frame.
@@ -58,12 +58,11 @@ impl Series {
     ///
     /// # Errors
     /// [`Error::InvalidParam`](crate::Error::InvalidParam) when the sizes differ or a pixel is not finite.
-    pub fn add(&mut self, frame: u32, picture: &Arc<Picture>, reference: &Arc<Picture>) -> Result<Difference> {
+    pub fn add(&mut self, frame: u32, picture: &Arc<Picture>, reference: &Arc<Reference>) -> Result<Difference> {
         let difference = Difference::of(&self.name, picture, reference)?;
         self.errors.add(&difference.errors);
-        let now = [picture.clone(), reference.clone()];
-        let popping = match self.last.replace(now) {
-            Some([i, r]) => self.popping.add(&self.name, [&i, &r], [picture, reference])?,
+        let popping = match self.last.replace((picture.clone(), reference.clone())) {
+            Some((i, r)) => self.popping.add(&self.name, (&i, &r), (picture, reference))?,
             None => None,
         };
         self.frames.push(FrameMetrics { frame, metrics: difference.errors.metrics(), popping });
@@ -93,16 +92,16 @@ impl Series {
 mod tests {
     use super::*;
 
-    fn uniform(value: f32) -> Arc<Picture> {
+    fn uniform(value: f32) -> Picture {
         let radiance = vec![[value; 3]; 12];
-        Arc::new(Picture { width: 4, height: 3, display: radiance.clone(), radiance, transmittance: None })
+        Picture { width: 4, height: 3, display: radiance.clone(), radiance, transmittance: None }
     }
 
     #[test]
     fn frames_and_their_sum_are_kept() {
         let mut series = Series::new("a");
         for (frame, picture, reference) in [(3, 0.25, 0.25), (4, 1.0, 0.5), (5, 0.5, 0.5)] {
-            series.add(frame, &uniform(picture), &uniform(reference)).unwrap();
+            series.add(frame, &Arc::new(uniform(picture)), &Arc::new(uniform(reference).into())).unwrap();
         }
         let frames: Vec<_> = series.frames().iter().map(|f| (f.frame, f.metrics.rmse, f.popping)).collect();
         assert_eq!(frames, [(3, 0.0, None), (4, 0.5, Some(2.0)), (5, 0.0, None)]);

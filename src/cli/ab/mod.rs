@@ -1,13 +1,17 @@
 //! `welkin ab`: one scene by two modes, both against a reference.
 
+mod reference;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Serialize;
 use welkin::compare::{Difference, FrameMetrics, HeatMap, Report, ReportSide, Scale, Series, Summary};
 use welkin::output::{BlendStats, DeviceStats, PassStats, Picture, PngDepth, numbered, write_json};
-use welkin::params::{Blend, Params};
+use welkin::params::Params;
 use welkin::{Error, Result};
+
+use reference::Judge;
 
 use super::args::{AbArgs, ReferenceArg};
 use super::progress::{Progress, note};
@@ -91,6 +95,9 @@ pub fn run(args: &AbArgs) -> Result<bool> {
     if args.max_popping.is_some() && range.len() < 2 {
         return Err(Error::invalid("--max-popping", "…", "--frames A..B with two frames or more beside it"));
     }
+    if args.spp.is_some() && args.reference != ReferenceArg::Path {
+        return Err(Error::invalid("--spp", "…", "--reference path beside it"));
+    }
     let params = scenes::load_precise(&args.scene, &args.picture)?;
     for frame in range.clone() {
         params.at_frame(frame).validate()?;
@@ -100,18 +107,16 @@ pub fn run(args: &AbArgs) -> Result<bool> {
     let out = Places::make(&args.out)?;
     let mut device = Device::open(&args.picture.scene, false)?;
     let mut sides = [Side::open("a", &mut device, &a, args)?, Side::open("b", &mut device, &b, args)?];
-    let (blend, why) = choose_reference(args.reference, &device, [&sides[0], &sides[1]])?;
-    let mut reference =
-        Side::open("reference", &mut device, &scenes::blended(params.clone(), Some(blend), "--reference")?, args)?;
-    let choice = BlendStats { requested: args.reference.to_string(), reason: why, ..reference.session.blend() };
+    let compared = [sides[0].session.blend().used, sides[1].session.blend().used];
+    let mut judge = Judge::open(args, &mut device, &params, [&compared[0], &compared[1]])?;
 
     let size = args.picture.size;
     let scene = args.scene.display().to_string();
-    let mut report = Report::new(&scene, &device.stats().name, [size.width, size.height], &choice.used);
+    let mut report = Report::new(&scene, &device.stats().name, [size.width, size.height], &judge.choice().used);
     let mut progress = (range.len() > 1).then(|| Progress::start("ab", range.len() as u64));
     for (done, frame) in range.clone().enumerate() {
         let at = params.at_frame(frame);
-        let truth = reference.render(&mut device, &at)?;
+        let truth = Arc::new(judge.frame(&mut device, &at, frame)?);
         let [a, b] = &mut sides;
         let pictures = [a.render(&mut device, &at)?, b.render(&mut device, &at)?];
         let differences = [a.series.add(frame, &pictures[0], &truth)?, b.series.add(frame, &pictures[1], &truth)?];
@@ -119,10 +124,10 @@ pub fn run(args: &AbArgs) -> Result<bool> {
         let number = args.frames.is_some().then_some(frame);
         out.write(
             number,
-            [("a", a), ("b", b), ("reference", &truth)],
+            [("a", a), ("b", b), ("reference", &truth.picture)],
             [("a", &differences[0]), ("b", &differences[1])],
         )?;
-        report.add(frame, [a, b, &truth], [&differences[0], &differences[1]])?;
+        report.add(frame, [a, b, &truth.picture], [&differences[0], &differences[1]])?;
         if let Some(progress) = &mut progress {
             progress.set(done as u64 + 1);
         }
@@ -137,7 +142,7 @@ pub fn run(args: &AbArgs) -> Result<bool> {
         height: size.height,
         device: device.stats(),
         frames: [range.start, range.end - 1],
-        reference: choice,
+        reference: judge.choice().clone(),
         passed: limits.iter().all(|limit| limit.passed),
         limits,
         a,
@@ -150,31 +155,6 @@ pub fn run(args: &AbArgs) -> Result<bool> {
     report.write(&out.file("report.html"), [report_side(0), report_side(1)])?;
     summarise(&metrics, &out);
     Ok(metrics.passed)
-}
-
-/// The mode that makes the reference, and why that one.
-fn choose_reference(asked: ReferenceArg, device: &Device, sides: [&Side; 2]) -> Result<(Blend, String)> {
-    match asked {
-        ReferenceArg::Mode(blend) => Ok((blend, "as requested".into())),
-        ReferenceArg::Exact => {
-            let modes = [Blend::Tiled, Blend::List].map(|mode| (mode, device.supports(mode)));
-            let compared = sides.map(|side| side.session.blend().used);
-            let usable = || modes.iter().filter(|(_, answer)| answer.is_ok()).map(|(mode, _)| *mode);
-            // A mode should not be its own judge.
-            let other = usable().find(|mode| !compared.contains(&mode.to_string()));
-            match other.map(|mode| (mode, "exact, and neither a nor b")).or(usable().next().map(|mode| (mode, "exact")))
-            {
-                Some((mode, why)) => Ok((mode, why.into())),
-                None => {
-                    let reasons =
-                        modes.iter().filter_map(|(mode, answer)| Some(format!("{mode}: {}", answer.as_ref().err()?)));
-                    let reasons: Vec<_> = reasons.collect();
-                    let needed = format!("--reference exact ({})", reasons.join("; "));
-                    Err(Error::Unsupported { needed, by: device.stats().name })
-                }
-            }
-        }
-    }
 }
 
 fn limits(args: &AbArgs, a: &SideMetrics) -> Vec<Limit> {
