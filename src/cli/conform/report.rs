@@ -14,7 +14,7 @@ pub struct Report {
     pub devices: Vec<DeviceReport>,
 }
 
-#[derive(Serialize, Default)]
+#[derive(Serialize, Default, Debug)]
 pub struct DeviceReport {
     /// Number of devices that there are.
     #[serde(skip)]
@@ -29,7 +29,7 @@ pub struct DeviceReport {
     pub rows: Vec<Row>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, Debug)]
 pub struct Device {
     pub index: usize,
     pub name: String,
@@ -53,7 +53,7 @@ impl Device {
     }
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, Debug)]
 pub struct Row {
     pub id: String,
     pub group: String,

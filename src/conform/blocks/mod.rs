@@ -11,20 +11,44 @@ mod order;
 mod table;
 mod timestamps;
 
-use super::{Check, Lab, Sabotage};
+use super::{Check, Lab, Sabotage, matches};
 use crate::Result;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Program};
 use bytemuck::Pod;
 
 /// All rows of the group.
 pub(super) fn add(list: &mut Vec<Check>) {
+    let start = list.len();
     lists::add(list);
     indirect::add(list);
     order::add(list);
     table::add(list);
     half::add(list);
     timestamps::add(list);
+    for check in &mut list[start..] {
+        let seen = SEEN.iter().find(|(pattern, _)| matches(pattern, &check.id));
+        check.fails_by.extend(seen.map_or(&[][..], |(_, by)| by));
+    }
 }
+
+/// Which breakages a row must see; the first pattern that fits counts.
+const SEEN: &[(&str, &[Sabotage])] = {
+    use Sabotage::{Expected, Lost, Reversed, Unordered};
+    &[
+        ("blocks.*.full", &[Lost, Unordered, Reversed, Expected]), // reversed: written where there is no room
+        ("blocks.append", &[Lost, Unordered, Expected]),
+        ("blocks.linked-lists", &[Lost, Unordered, Expected]),
+        ("blocks.indirect.dispatch", &[Lost, Reversed, Expected]),
+        ("blocks.indirect.draw", &[Lost, Expected]),
+        ("blocks.prefix-sum", &[Lost]),
+        ("blocks.stable-sort", &[Lost, Reversed]), // reversed: equal keys change places
+        ("blocks.compaction", &[Lost, Reversed]),
+        ("blocks.filter.*", &[Lost, Reversed, Unordered, Expected]), // unordered: another way to repeat
+        ("blocks.half.*", &[Lost, Reversed, Expected]),
+        ("blocks.timestamps.order", &[Reversed, Expected]),
+        ("blocks.timestamps.*", &[Lost, Reversed]),
+    ]
+};
 
 /// A compute pipeline, broken if the lab is told to.
 fn pipeline(lab: &Lab, program: &'static Program) -> Result<ComputePipeline> {
