@@ -1,8 +1,8 @@
 //! Mode `alpha`: sorted alpha blending by fixed function (`glsl/blend/alpha.frag`). Runs on every device.
 
-use super::{BlendInputs, CloudTargets, NEAREST_FORMAT, NO_CLOUD, OPTICAL_DEPTH_SAMPLER, Shading, cloud_format};
+use super::{BlendInputs, CloudTargets, NEAREST_FORMAT, NO_CLOUD, Shading, cloud_format};
 use crate::Result;
-use crate::gpu::{Attachment, BlendState, Draw, Gpu, GraphicsPipeline, GraphicsState, Recorder, Sampler, Target};
+use crate::gpu::{Attachment, BlendState, Draw, Gpu, GraphicsPipeline, GraphicsState, Recorder, Target};
 use crate::params::Precision;
 use crate::shaders::blend_alpha_frag as shader;
 use std::sync::Arc;
@@ -31,18 +31,7 @@ impl Alpha {
         targets: &CloudTargets,
         extent: [u32; 2],
     ) -> Result<()> {
-        let bindings = shader::Bindings {
-            frame: inputs.frame,
-            particles: inputs.particles,
-            order: inputs.order,
-            lights: inputs.lights,
-            medium: inputs.medium,
-            sky_light: inputs.sky_light,
-            optical_depth_lut: inputs.optical_depth_lut.sampled(OPTICAL_DEPTH_SAMPLER),
-            scattering_lut: inputs.scattering_lut.sampled(Sampler::LinearClamp),
-            detail_tile: inputs.detail_tile.sampled(Sampler::LinearRepeat),
-            opaque_distance: inputs.opaque_distance.sampled(Sampler::NearestClamp),
-        };
+        let bindings = scene_bindings!(shader, inputs, {});
         let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
         let attachments = [
             Target { image: &targets.cloud, clear: Some([0.0, 0.0, 0.0, 1.0]) },

@@ -1,21 +1,18 @@
-//! Mode `attachment`: the volume-aware merge in colour attachments that fragments read back, ordered by
-//! `VK_EXT_rasterization_order_attachment_access` (`glsl/blend/attachment.frag`).
+//! Mode `attachment`: the merges of `interlock` in colour attachments that fragments read back, ordered by
+//! `VK_EXT_rasterization_order_attachment_access` (`glsl/blend/attachment*.frag`).
 
-use super::{BlendInputs, CloudTargets, OPTICAL_DEPTH_SAMPLER, Shading};
+use super::{BlendInputs, CloudTargets, Shading};
 use crate::Result;
 use crate::gpu::{
     Attachment, BlendState, Capabilities, ComputePipeline, Draw, Feature, Feedback, FeedbackPath, Gpu,
     GraphicsPipeline, GraphicsState, Image, ImageDesc, Recorder, Sampler, Target,
 };
-use crate::shaders::{blend_attachment_frag as shader, blend_resolve_comp as resolve};
+use crate::shaders::{
+    blend_attachment_frag as one, blend_attachment_resolve_comp as resolve, blend_attachment2_frag as two,
+    blend_attachment4_frag as four,
+};
 use ash::vk;
 use std::sync::Arc;
-
-const FORMATS: [(&str, vk::Format); 3] = [
-    ("attachment committed", vk::Format::R32G32B32A32_SFLOAT),
-    ("attachment pending", vk::Format::R32G32B32A32_SFLOAT),
-    ("attachment extent", vk::Format::R32G32_SFLOAT),
-];
 
 pub(super) struct AttachmentMode {
     pipeline: GraphicsPipeline,
@@ -23,8 +20,30 @@ pub(super) struct AttachmentMode {
     state: Vec<Image>,
 }
 
-/// How this device lets fragments read what they draw into.
-pub(super) fn path(capabilities: &Capabilities) -> FeedbackPath {
+/// Attachments that a window of `k` segments is kept in: what is committed, `k` colours with optical depth, and two segments'
+/// ends in each of the rest.
+fn attachment_count(k: u32) -> u32 {
+    1 + k + k.div_ceil(2)
+}
+
+/// Whether a device can keep a window of `k` segments in attachments, or a sentence why not.
+pub(super) fn supports(k: u32, capabilities: &Capabilities) -> Result<(), String> {
+    capabilities.supports(Feature::RasterizationOrderAttachmentAccess).map_err(str::to_owned)?;
+    let (needed, most) = (attachment_count(k), capabilities.max_feedback_attachments);
+    if k > 4 {
+        // No driver known has so many.
+        return Err(format!(
+            "attachment keeps 4 segments at most: {k} would take {needed} attachments, {most} can be read"
+        ));
+    }
+    if needed > most {
+        return Err(format!("{k} segments take {needed} attachments, of which the device lets {most} be read"));
+    }
+    Ok(())
+}
+
+/// How a device lets fragments read what they draw into.
+fn path(capabilities: &Capabilities) -> FeedbackPath {
     match capabilities.supports(Feature::DynamicRenderingLocalRead) {
         Ok(()) => FeedbackPath::LocalRead,
         Err(_) => FeedbackPath::Subpass,
@@ -32,21 +51,33 @@ pub(super) fn path(capabilities: &Capabilities) -> FeedbackPath {
 }
 
 impl AttachmentMode {
-    pub(super) fn new(gpu: &Arc<Gpu>, shading: Shading, extent: [u32; 2]) -> Result<Self> {
+    pub(super) fn new(gpu: &Arc<Gpu>, k: u32, shading: Shading, extent: [u32; 2]) -> Result<Self> {
+        let count = attachment_count(k) as usize;
+        let mut formats = vec![vk::Format::R32G32B32A32_SFLOAT; count];
+        if k == 1 {
+            formats[2] = vk::Format::R32G32_SFLOAT;
+        }
+        let usage = vk::ImageUsageFlags::SAMPLED
+            | vk::ImageUsageFlags::COLOR_ATTACHMENT
+            | vk::ImageUsageFlags::INPUT_ATTACHMENT;
+        let image = |(i, format): (usize, &vk::Format)| {
+            let name = &format!("attachment state {i}");
+            Image::new(gpu, &ImageDesc { name, extent: [extent[0], extent[1], 0], format: *format, usage })
+        };
         let state = GraphicsState {
-            attachments: FORMATS.map(|(_, format)| Attachment { format, blend: BlendState::Replace }).to_vec(),
+            attachments: formats.iter().map(|&format| Attachment { format, blend: BlendState::Replace }).collect(),
             feedback: Some(Feedback { path: path(gpu.capabilities()), ordered: true }),
             ..GraphicsState::default()
         };
-        let usage = vk::ImageUsageFlags::STORAGE
-            | vk::ImageUsageFlags::COLOR_ATTACHMENT
-            | vk::ImageUsageFlags::INPUT_ATTACHMENT;
-        let image =
-            |(name, format)| Image::new(gpu, &ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage });
+        let program = match k {
+            1 => &one::PROGRAM,
+            2 => &two::PROGRAM,
+            _ => &four::PROGRAM,
+        };
         Ok(Self {
-            pipeline: GraphicsPipeline::new(gpu, &shader::PROGRAM, &shading.specialization(), state)?,
-            resolve: ComputePipeline::new(gpu, &resolve::PROGRAM, &[])?,
-            state: FORMATS.into_iter().map(image).collect::<Result<_>>()?,
+            pipeline: GraphicsPipeline::new(gpu, program, &shading.specialization(), state)?,
+            resolve: ComputePipeline::new(gpu, &resolve::PROGRAM, &[("WINDOW", k)])?,
+            state: formats.iter().enumerate().map(image).collect::<Result<_>>()?,
         })
     }
 
@@ -57,33 +88,38 @@ impl AttachmentMode {
         targets: &CloudTargets,
         extent: [u32; 2],
     ) -> Result<()> {
-        let [committed_state, pending_state, extent_state] = [&self.state[0], &self.state[1], &self.state[2]];
-        rec.pass("blend", |rec| {
-            let bindings = shader::Bindings {
-                frame: inputs.frame,
-                particles: inputs.particles,
-                order: inputs.order,
-                lights: inputs.lights,
-                medium: inputs.medium,
-                sky_light: inputs.sky_light,
-                optical_depth_lut: inputs.optical_depth_lut.sampled(OPTICAL_DEPTH_SAMPLER),
-                scattering_lut: inputs.scattering_lut.sampled(Sampler::LinearClamp),
-                detail_tile: inputs.detail_tile.sampled(Sampler::LinearRepeat),
-                opaque_distance: inputs.opaque_distance.sampled(Sampler::NearestClamp),
-                committed_state,
-                pending_state,
-                extent_state,
-            };
-            let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
-            // Optical depth 0: nothing pending, nothing committed.
-            let state: Vec<_> = self.state.iter().map(|image| Target { image, clear: Some([0.0; 4]) }).collect();
-            rec.draw(&self.pipeline, &bindings, &(), extent, &state, draw)
+        // Optical depth 0: nothing pending, nothing committed.
+        let state: Vec<_> = self.state.iter().map(|image| Target { image, clear: Some([0.0; 4]) }).collect();
+        let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
+        rec.pass("blend", |rec| match &self.state[..] {
+            [state_0, state_1, state_2] => {
+                let bindings = scene_bindings!(one, inputs, { state_0: state_0, state_1: state_1, state_2: state_2, });
+                rec.draw(&self.pipeline, &bindings, &(), extent, &state, draw)
+            }
+            [state_0, state_1, state_2, state_3] => {
+                let bindings = scene_bindings!(two, inputs, {
+                    state_0: state_0, state_1: state_1, state_2: state_2, state_3: state_3,
+                });
+                rec.draw(&self.pipeline, &bindings, &(), extent, &state, draw)
+            }
+            [state_0, state_1, state_2, state_3, state_4, state_5, state_6] => {
+                let bindings = scene_bindings!(four, inputs, {
+                    state_0: state_0, state_1: state_1, state_2: state_2, state_3: state_3,
+                    state_4: state_4, state_5: state_5, state_6: state_6,
+                });
+                rec.draw(&self.pipeline, &bindings, &(), extent, &state, draw)
+            }
+            other => unreachable!("no window is kept in {} attachments", other.len()),
         })?;
         rec.pass("resolve", |rec| {
+            let state = |i: usize| self.state.get(i).unwrap_or(&self.state[0]).sampled(Sampler::NearestClamp);
             let bindings = resolve::Bindings {
-                committed_state,
-                pending_state,
-                extent_state,
+                state_0: state(0),
+                state_1: state(1),
+                state_2: state(2),
+                state_3: state(3),
+                state_4: state(4),
+                state_5: state(5),
                 cloud: &targets.cloud,
                 nearest: &targets.nearest,
             };

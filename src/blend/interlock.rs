@@ -1,38 +1,48 @@
-//! Mode `interlock`: the volume-aware merge, ordered per pixel by `VK_EXT_fragment_shader_interlock`
-//! (`glsl/blend/interlock.frag`, Yusov 5.5).
+//! Mode `interlock`: the volume-aware merge, ordered per pixel by `VK_EXT_fragment_shader_interlock`: with one pending
+//! segment `glsl/blend/interlock.frag` (Yusov 5.5), with more `glsl/blend/window.frag`.
 
-use super::{BlendInputs, CloudTargets, OPTICAL_DEPTH_SAMPLER, Shading};
+use super::{BlendInputs, CloudTargets, Shading};
 use crate::Result;
-use crate::gpu::{ComputePipeline, Draw, Gpu, GraphicsPipeline, GraphicsState, Image, ImageDesc, Recorder, Sampler};
-use crate::shaders::{blend_interlock_frag as shader, blend_resolve_comp as resolve};
+use crate::gpu::{ComputePipeline, Draw, Gpu, GraphicsPipeline, GraphicsState, Image, ImageDesc, Recorder};
+use crate::shaders::{blend_interlock_frag as single, blend_resolve_comp as single_resolve};
+use crate::shaders::{blend_window_frag as window, blend_window_resolve_comp as window_resolve};
 use ash::vk;
 use std::sync::Arc;
 
 pub(super) struct Interlock {
     pipeline: GraphicsPipeline,
     resolve: ComputePipeline,
-    committed: Image,
-    pending: Image,
-    extent_state: Image,
+    state: State,
+}
+
+/// What a pixel keeps between fragments; zeros are nothing pending, nothing committed.
+enum State {
+    Single { committed: Image, pending: Image, ends: Image },
+    Window(Image),
 }
 
 impl Interlock {
-    pub(super) fn new(gpu: &Arc<Gpu>, shading: Shading, extent: [u32; 2]) -> Result<Self> {
-        let image = |name, format| {
-            let usage = vk::ImageUsageFlags::STORAGE;
-            Image::new(gpu, &ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage })
+    pub(super) fn new(gpu: &Arc<Gpu>, k: u32, shading: Shading, extent: [u32; 2]) -> Result<Self> {
+        let usage = vk::ImageUsageFlags::STORAGE;
+        let desc = |name, format| ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage };
+        let (wide, narrow) = (vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32G32_SFLOAT);
+        let (program, resolve, constants, state) = if k == 1 {
+            let state = State::Single {
+                committed: Image::new(gpu, &desc("interlocked committed", wide))?,
+                pending: Image::new(gpu, &desc("interlocked pending", wide))?,
+                ends: Image::new(gpu, &desc("interlocked extent", narrow))?,
+            };
+            (&single::PROGRAM, &single_resolve::PROGRAM, vec![], state)
+        } else {
+            let layers = 1 + k + k / 2;
+            let state = State::Window(Image::layered(gpu, &desc("interlocked window", wide), layers)?);
+            (&window::PROGRAM, &window_resolve::PROGRAM, vec![("WINDOW", k)], state)
         };
+        let specialization = [&shading.specialization()[..], &constants].concat();
         Ok(Self {
-            pipeline: GraphicsPipeline::new(
-                gpu,
-                &shader::PROGRAM,
-                &shading.specialization(),
-                GraphicsState::default(),
-            )?,
-            resolve: ComputePipeline::new(gpu, &resolve::PROGRAM, &[])?,
-            committed: image("interlocked committed", vk::Format::R32G32B32A32_SFLOAT)?,
-            pending: image("interlocked pending", vk::Format::R32G32B32A32_SFLOAT)?,
-            extent_state: image("interlocked extent", vk::Format::R32G32_SFLOAT)?,
+            pipeline: GraphicsPipeline::new(gpu, program, &specialization, GraphicsState::default())?,
+            resolve: ComputePipeline::new(gpu, resolve, &constants)?,
+            state,
         })
     }
 
@@ -43,37 +53,41 @@ impl Interlock {
         targets: &CloudTargets,
         extent: [u32; 2],
     ) -> Result<()> {
-        rec.pass("blend", |rec| {
-            for image in [&self.committed, &self.pending, &self.extent_state] {
-                rec.clear_image(image, [0.0; 4]); // Optical depth 0: nothing pending, nothing committed.
+        let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
+        let (cloud, nearest, threads) = (&targets.cloud, &targets.nearest, [extent[0], extent[1], 1]);
+        match &self.state {
+            State::Single { committed, pending, ends } => {
+                rec.pass("blend", |rec| {
+                    for image in [committed, pending, ends] {
+                        rec.clear_image(image, [0.0; 4]);
+                    }
+                    let bindings = scene_bindings!(single, inputs, {
+                        interlocked_committed: committed, interlocked_pending: pending, interlocked_extent: ends,
+                    });
+                    rec.draw(&self.pipeline, &bindings, &(), extent, &[], draw)
+                })?;
+                rec.pass("resolve", |rec| {
+                    let bindings = single_resolve::Bindings {
+                        committed_state: committed,
+                        pending_state: pending,
+                        extent_state: ends,
+                        cloud,
+                        nearest,
+                    };
+                    rec.dispatch(&self.resolve, &bindings, &(), threads)
+                })
             }
-            let bindings = shader::Bindings {
-                frame: inputs.frame,
-                particles: inputs.particles,
-                order: inputs.order,
-                lights: inputs.lights,
-                medium: inputs.medium,
-                sky_light: inputs.sky_light,
-                optical_depth_lut: inputs.optical_depth_lut.sampled(OPTICAL_DEPTH_SAMPLER),
-                scattering_lut: inputs.scattering_lut.sampled(Sampler::LinearClamp),
-                detail_tile: inputs.detail_tile.sampled(Sampler::LinearRepeat),
-                opaque_distance: inputs.opaque_distance.sampled(Sampler::NearestClamp),
-                interlocked_committed: &self.committed,
-                interlocked_pending: &self.pending,
-                interlocked_extent: &self.extent_state,
-            };
-            let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
-            rec.draw(&self.pipeline, &bindings, &(), extent, &[], draw)
-        })?;
-        rec.pass("resolve", |rec| {
-            let bindings = resolve::Bindings {
-                committed_state: &self.committed,
-                pending_state: &self.pending,
-                extent_state: &self.extent_state,
-                cloud: &targets.cloud,
-                nearest: &targets.nearest,
-            };
-            rec.dispatch(&self.resolve, &bindings, &(), [extent[0], extent[1], 1])
-        })
+            State::Window(window_state) => {
+                rec.pass("blend", |rec| {
+                    rec.clear_image(window_state, [0.0; 4]);
+                    let bindings = scene_bindings!(window, inputs, { window_state: window_state, });
+                    rec.draw(&self.pipeline, &bindings, &(), extent, &[], draw)
+                })?;
+                rec.pass("resolve", |rec| {
+                    let bindings = window_resolve::Bindings { window_state, cloud, nearest };
+                    rec.dispatch(&self.resolve, &bindings, &(), threads)
+                })
+            }
+        }
     }
 }

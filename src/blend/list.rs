@@ -4,10 +4,8 @@
 //! The append buffer counts past its capacity and grows between frames ([`List::grow`]). Where it may not grow any more,
 //! the picture is drawn in bands of rows that take turns with it: however many segments a frame has, none is lost.
 
-use super::{BlendInputs, CloudTargets, NodeBudget, OPTICAL_DEPTH_SAMPLER, Shading};
-use crate::gpu::{
-    Buffer, ComputePipeline, Draw, DrawCall, Gpu, GraphicsPipeline, GraphicsState, PassState, Recorder, Sampler,
-};
+use super::{BlendInputs, CloudTargets, NodeBudget, Shading};
+use crate::gpu::{Buffer, ComputePipeline, Draw, DrawCall, Gpu, GraphicsPipeline, GraphicsState, PassState, Recorder};
 use crate::grid::{Counters, grown};
 use crate::renderer::ListUse;
 use crate::shaders::{blend_list_frag as shader, blend_list_resolve_comp as resolve};
@@ -139,21 +137,11 @@ impl List {
         rows: Range<u32>,
     ) -> Result<()> {
         rec.fill_buffer(&self.wanted, 0, self.wanted.size(), 0);
-        let bindings = shader::Bindings {
-            frame: inputs.frame,
-            particles: inputs.particles,
-            order: inputs.order,
-            lights: inputs.lights,
-            medium: inputs.medium,
-            sky_light: inputs.sky_light,
-            optical_depth_lut: inputs.optical_depth_lut.sampled(OPTICAL_DEPTH_SAMPLER),
-            scattering_lut: inputs.scattering_lut.sampled(Sampler::LinearClamp),
-            detail_tile: inputs.detail_tile.sampled(Sampler::LinearRepeat),
-            opaque_distance: inputs.opaque_distance.sampled(Sampler::NearestClamp),
+        let bindings = scene_bindings!(shader, inputs, {
             list_heads: &self.heads,
             list_nodes: &self.nodes,
             list_use: &self.wanted,
-        };
+        });
         let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
         let push = bytemuck::bytes_of(&self.capacity);
         let pass = PassState { rows: Some((rows.start, rows.end)), ..PassState::default() };

@@ -5,11 +5,30 @@
 //!
 //! | mode | how | state per pixel |
 //! |---|---|---|
-//! | [`Interlock`](crate::params::Blend::Interlock) | volume-aware merge in drawing order, ordered by `VK_EXT_fragment_shader_interlock` | 40 bytes |
-//! | [`Attachment`](crate::params::Blend::Attachment) | the same merge, ordered by `VK_EXT_rasterization_order_attachment_access` | 40 bytes |
+//! | [`Interlock`](crate::params::Blend::Interlock) | volume-aware merge with K pending segments, ordered by `VK_EXT_fragment_shader_interlock` | 40 bytes; 16 + 24 K for K > 1 |
+//! | [`Attachment`](crate::params::Blend::Attachment) | the same, K up to 4, ordered by `VK_EXT_rasterization_order_attachment_access` | the same |
 //! | [`List`](crate::params::Blend::List) | all segments kept, sorted and integrated exactly at resolve | 4 bytes, and 32 for each segment |
 //! | [`Tiled`](crate::params::Blend::Tiled) | compute: particles binned to screen tiles, exact integral front to back | none; 32 bytes for each particle, 16 for each tile it touches |
 //! | [`Alpha`](crate::params::Blend::Alpha) | fixed-function blending of sorted particles; overlap is ignored | none |
+
+/// The bindings of a mode's program `$shader`: what every mode reads (`glsl/blend/bindings.glsl`), and its own.
+macro_rules! scene_bindings {
+    ($shader:ident, $inputs:expr, { $($name:ident: $resource:expr,)* }) => {
+        $shader::Bindings {
+            frame: $inputs.frame,
+            particles: $inputs.particles,
+            order: $inputs.order,
+            lights: $inputs.lights,
+            medium: $inputs.medium,
+            sky_light: $inputs.sky_light,
+            optical_depth_lut: $inputs.optical_depth_lut.sampled($crate::gpu::Sampler::LinearRepeatClampRepeat),
+            scattering_lut: $inputs.scattering_lut.sampled($crate::gpu::Sampler::LinearClamp),
+            detail_tile: $inputs.detail_tile.sampled($crate::gpu::Sampler::LinearRepeat),
+            opaque_distance: $inputs.opaque_distance.sampled($crate::gpu::Sampler::NearestClamp),
+            $($name: $resource,)*
+        }
+    };
+}
 
 mod alpha;
 mod attachment;
@@ -18,9 +37,9 @@ mod list;
 pub mod medium;
 mod tiled;
 
-use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder, Sampler};
+use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder};
 use crate::grid::Counters;
-use crate::params::{Blend, Lighting, Precision};
+use crate::params::{Blend, Lighting, Precision, WINDOWS};
 use crate::renderer::ListUse;
 use crate::{Error, Result};
 use ash::vk;
@@ -130,10 +149,11 @@ pub fn choose(requested: Blend, capabilities: &Capabilities) -> Result<Choice> {
 pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> {
     match mode {
         Blend::Auto | Blend::Alpha | Blend::List | Blend::Tiled => Ok(()),
-        Blend::Interlock(1) => capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
-        Blend::Attachment(1) => {
-            capabilities.supports(Feature::RasterizationOrderAttachmentAccess).map_err(str::to_owned)
+        Blend::Interlock(k) | Blend::Attachment(k) if !WINDOWS.contains(&k) => {
+            Err(format!("a window has one of {WINDOWS:?} segments, not {k}"))
         }
+        Blend::Interlock(_) => capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
+        Blend::Attachment(k) => attachment::supports(k, capabilities),
         other => Err(format!("{other} is not in this version yet")),
     }
 }
@@ -193,8 +213,8 @@ impl Blender {
         budget: NodeBudget,
     ) -> Result<Self> {
         let mode = match choose(mode, gpu.capabilities())?.used {
-            Blend::Interlock(_) => Mode::Interlock(interlock::Interlock::new(gpu, shading, extent)?),
-            Blend::Attachment(_) => Mode::Attachment(attachment::AttachmentMode::new(gpu, shading, extent)?),
+            Blend::Interlock(k) => Mode::Interlock(interlock::Interlock::new(gpu, k, shading, extent)?),
+            Blend::Attachment(k) => Mode::Attachment(attachment::AttachmentMode::new(gpu, k, shading, extent)?),
             Blend::List => Mode::List(list::List::new(gpu, shading, extent, budget)?),
             Blend::Tiled => Mode::Tiled(tiled::Tiled::new(gpu, shading, extent, budget)?),
             _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),
@@ -233,5 +253,3 @@ impl Blender {
         }
     }
 }
-
-const OPTICAL_DEPTH_SAMPLER: Sampler = Sampler::LinearRepeatClampRepeat;

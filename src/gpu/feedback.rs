@@ -23,6 +23,28 @@ pub struct Feedback {
     pub ordered: bool,
 }
 
+impl Feedback {
+    /// What asks for order in a subpass; [`FeedbackPath::LocalRead`] has none.
+    #[must_use]
+    pub fn subpass_flags(self) -> vk::SubpassDescriptionFlags {
+        if self.ordered {
+            vk::SubpassDescriptionFlags::RASTERIZATION_ORDER_ATTACHMENT_COLOR_ACCESS_EXT
+        } else {
+            vk::SubpassDescriptionFlags::empty()
+        }
+    }
+
+    /// What asks for order in a pipeline.
+    #[must_use]
+    pub fn blend_flags(self) -> vk::PipelineColorBlendStateCreateFlags {
+        if self.ordered {
+            vk::PipelineColorBlendStateCreateFlags::RASTERIZATION_ORDER_ATTACHMENT_ACCESS_EXT
+        } else {
+            vk::PipelineColorBlendStateCreateFlags::empty()
+        }
+    }
+}
+
 /// The two ways in which Vulkan lets a fragment read an attachment that is being drawn into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeedbackPath {
@@ -60,12 +82,7 @@ pub fn create_render_pass(gpu: &Gpu, state: &GraphicsState, clear: u32) -> Resul
                 .aspect_mask(vk::ImageAspectFlags::COLOR)
         })
         .collect();
-    let flags = match state.feedback {
-        Some(Feedback { ordered: true, .. }) => {
-            vk::SubpassDescriptionFlags::RASTERIZATION_ORDER_ATTACHMENT_COLOR_ACCESS_EXT
-        }
-        _ => vk::SubpassDescriptionFlags::empty(),
-    };
+    let flags = state.feedback.map_or(vk::SubpassDescriptionFlags::empty(), Feedback::subpass_flags);
     let subpasses = [vk::SubpassDescription2::default()
         .flags(flags)
         .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)

@@ -365,8 +365,8 @@ fn build(gpu: &Gpu, desc: &PipelineDesc, layout: vk::PipelineLayout) -> Result<v
             let formats: Vec<_> = state.attachments.iter().map(|attachment| attachment.format).collect();
             let blends: Vec<_> = state.attachments.iter().map(|attachment| attachment.blend.state()).collect();
             let mut blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
-            if state.feedback.is_some_and(|feedback| feedback.ordered) {
-                blend = blend.flags(vk::PipelineColorBlendStateCreateFlags::RASTERIZATION_ORDER_ATTACHMENT_ACCESS_EXT);
+            if let Some(feedback) = state.feedback {
+                blend = blend.flags(feedback.blend_flags());
             }
             let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
             let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);

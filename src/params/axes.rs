@@ -130,9 +130,6 @@ pub(super) fn validate(params: &Params) -> Result<()> {
     require_here(SOURCES, "clouds.source", |value| *value == source)?;
     require_here(LIGHTINGS, "clouds.lighting", |value| *value == lighting)?;
     require_here(BLENDS, "quality.blend", |value| value.same_kind(&blend))?;
-    if matches!(blend, Blend::Interlock(k) | Blend::Attachment(k) if k != 1) {
-        return Err(not_yet(format!("quality.blend = \"{blend}\""), "a window of 1"));
-    }
     if !COMBINATIONS.contains(&(source, lighting)) {
         let source_name = name_of(SOURCES, |value| *value == source);
         let lighting_name = name_of(LIGHTINGS, |value| *value == lighting);

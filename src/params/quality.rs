@@ -76,6 +76,9 @@ impl Preset {
     }
 }
 
+/// The windows that [`Blend::Interlock`] and [`Blend::Attachment`] come in [segments].
+pub const WINDOWS: [u32; 4] = [1, 2, 4, 8];
+
 impl Default for Quality {
     fn default() -> Self {
         Preset::default().quality()
@@ -97,7 +100,7 @@ impl Quality {
             return Err(Error::invalid("quality.downscale", self.downscale, "1, 2 or 4"));
         }
         if let Blend::Interlock(k) | Blend::Attachment(k) = self.blend
-            && ![1, 2, 4, 8].contains(&k)
+            && !WINDOWS.contains(&k)
         {
             return Err(Error::invalid("quality.blend", self.blend, "a window of 1, 2, 4 or 8 segments"));
         }
