@@ -5,8 +5,6 @@ mod support;
 
 use support::{RAY_ROUNDING, Random, SIZE, ball, draw, has_interlock, max_error, open, segment};
 use welkin::blend::NO_CLOUD;
-use welkin::gpu::Feature;
-use welkin::gpu::standalone::{Options, Standalone};
 use welkin::params::Blend;
 use welkin::reference::segments::{self, Segment};
 use welkin::shared::Particle;
@@ -113,23 +111,6 @@ fn the_same_scene_gives_the_same_bits_twenty_times() {
         for _ in 1..20 {
             let again = draw(&mut device, mode, &particles, NO_CLOUD);
             assert!(first.cloud == again.cloud && first.nearest == again.nearest);
-        }
-    }
-}
-
-#[test]
-fn attachments_hold_what_interlock_holds_by_either_path() {
-    for without in [vec![], vec![Feature::DynamicRenderingLocalRead]] {
-        let mut device = Standalone::new(Options { validation: true, without, ..Options::default() }).unwrap();
-        let mut random = Random(7);
-        let particles: Vec<Particle> = (0..50).map(|_| random.particle(220.0, 150.0)).collect();
-        let picture = draw(&mut device, Blend::Attachment(1), &particles, NO_CLOUD);
-        let error = max_error(&picture, &particles, NO_CLOUD, segments::merged);
-        assert!(error < 2.0 * RAY_ROUNDING, "{error}");
-        println!("{error} {:?}", device.gpu().described_pipelines());
-        if has_interlock(&device) {
-            let other = draw(&mut device, Blend::Interlock(1), &particles, NO_CLOUD);
-            assert!(picture.cloud == other.cloud && picture.nearest == other.nearest);
         }
     }
 }

@@ -4,12 +4,14 @@
 #[path = "support/blend.rs"]
 mod support;
 
+use ash::vk;
 use std::sync::{Arc, Mutex};
-use support::{Picture, Random, SIZE, ball, draw, has_interlock, open, segment};
+use support::{Picture, Random, SIZE, ball, draw, open, segment};
 use welkin::blend::{AUTO, NO_CLOUD, choose, supports};
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{
-    Buffer, BufferKind, ComputePipeline, Feature, FeedbackPath, PipelineDesc, PipelineFactory, PipelineKind,
+    BlendState, Buffer, BufferKind, ComputePipeline, Feature, FeedbackPath, GraphicsState, PipelineDesc,
+    PipelineFactory, PipelineKind,
 };
 use welkin::params::{Blend, WINDOWS};
 use welkin::reference::segments::{self, Composite, Segment, Windowed};
@@ -218,13 +220,20 @@ impl PipelineFactory for Descriptions {
     }
 }
 
-/// Every way in which this driver can keep a window of `k`: a name, a device that does it so, the mode.
-fn ways(k: u32) -> Vec<(String, Standalone, Blend)> {
-    let open = |without: Vec<Feature>, path: FeedbackPath| {
+impl Descriptions {
+    /// The last graphics pipeline.
+    fn graphics(&self) -> PipelineDesc {
+        let built = self.0.lock().unwrap();
+        built.iter().rfind(|desc| matches!(desc.kind, PipelineKind::Graphics(_))).unwrap().clone()
+    }
+}
+
+/// Every way in which this driver can keep a window of `k`: a name, a device that does it so and what it builds, the mode.
+fn ways(k: u32) -> Vec<(String, (Standalone, Descriptions), Blend)> {
+    let open = |mode: Blend, without: Vec<Feature>, path: Option<FeedbackPath>| {
         let built = Descriptions::default();
         let factory = Some(Box::new(built.clone()) as Box<dyn PipelineFactory>);
         let device = Standalone::new(Options { validation: true, without, factory, ..Options::default() }).unwrap();
-        let mode = Blend::Attachment(k);
         if let Err(reason) = supports(mode, device.gpu().capabilities()) {
             println!("{mode} not proved here: {reason}");
             return None;
@@ -232,91 +241,115 @@ fn ways(k: u32) -> Vec<(String, Standalone, Blend)> {
         let particle = ball([0.0, 0.0, -100.0], [10.0; 3], 0.1, [1.0; 3]);
         let mut device = device;
         draw(&mut device, mode, &[particle], NO_CLOUD);
-        let used = built.0.lock().unwrap().iter().find_map(|desc| match &desc.kind {
+        let used = match built.graphics().kind {
             PipelineKind::Graphics(state) => state.feedback.map(|feedback| feedback.path),
             PipelineKind::Compute => None,
-        });
-        (used == Some(path)).then(|| (format!("{mode} by {path:?}"), device, mode))
+        };
+        (used == path).then(|| (format!("{mode} by {path:?}"), (device, built), mode))
     };
-    let mut ways = Vec::new();
-    let device = support::open(true);
-    if has_interlock(&device) {
-        ways.push((format!("interlock:{k}"), device, Blend::Interlock(k)));
-    }
-    ways.extend(open(vec![], FeedbackPath::LocalRead));
-    ways.extend(open(vec![Feature::DynamicRenderingLocalRead], FeedbackPath::Subpass));
-    ways
+    let without = vec![Feature::DynamicRenderingLocalRead];
+    let ways = [
+        open(Blend::Interlock(k), vec![], None),
+        open(Blend::Attachment(k), vec![], Some(FeedbackPath::LocalRead)),
+        open(Blend::Attachment(k), without, Some(FeedbackPath::Subpass)),
+    ];
+    ways.into_iter().flatten().collect()
 }
 
 #[test]
 fn every_way_to_keep_a_window_gives_what_its_model_gives() {
     let mut random = Random(7);
-    let heaps: Vec<Vec<Particle>> = [3, 12, 40]
-        .map(|count| {
-            let mut heap: Vec<Particle> = (0..count).map(|_| random.particle(220.0, 150.0)).collect();
-            // By distance of the centre, as the renderer draws them; the last heap is left in disorder.
-            let far = |p: &Particle| p.centre.iter().map(|c| c * c).sum::<f32>();
-            if count < 40 {
-                heap.sort_by(|a, b| far(b).total_cmp(&far(a)));
-            }
-            heap
-        })
-        .to_vec();
+    let heaps = [3, 12, 40].map(|count| {
+        let mut heap: Vec<Particle> = (0..count).map(|_| random.particle(220.0, 150.0)).collect();
+        // By distance of the centre, as the renderer draws them; the last heap is left in disorder.
+        let far = |p: &Particle| p.centre.iter().map(|c| c * c).sum::<f32>();
+        if count < 40 {
+            heap.sort_by(|a, b| far(b).total_cmp(&far(a)));
+        }
+        heap
+    });
     let around = ball([5.0, -3.0, 2.0], [60.0, 50.0, 70.0], 0.4, [0.7, 0.7, 0.2]);
     let cut = ball([50.0, 0.0, 0.0], [55.0, 20.0, 20.0], 0.3, [0.2, 0.9, 0.9]);
     let far = ball([0.0, 0.0, -180.0], [50.0, 50.0, 50.0], 0.5, [0.9, 0.3, 0.4]);
     let near = ball([10.0, 0.0, -150.0], [70.0, 30.0, 60.0], 0.2, [0.1, 0.3, 0.8]);
     let eye_inside = vec![far, near, cut, around];
-    let scenes: Vec<(Vec<Particle>, f32)> = heaps
-        .into_iter()
-        .map(|heap| (heap, NO_CLOUD))
-        .chain([(eye_inside.clone(), NO_CLOUD), (eye_inside, 160.0)])
-        .collect();
+    let [few, more, disorder] = heaps;
+    let scenes = [(few, NO_CLOUD), (more, NO_CLOUD), (disorder, NO_CLOUD), (eye_inside, 160.0)];
+    // What pixel each ray belongs to, and the ray.
+    let rays = scenes.each_ref().map(|(particles, opaque)| {
+        let pixels = (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y)));
+        let ray = |(x, y)| particles.iter().filter_map(|p| segment(p, x, y, f64::from(*opaque))).collect();
+        let rays = pixels.map(|(x, y)| ((y * SIZE + x) as usize, ray((x, y))));
+        rays.filter(|(_, ray): &(usize, Vec<Segment>)| !ray.is_empty()).unzip::<usize, _, Vec<_>, Vec<_>>()
+    });
     for k in WINDOWS {
-        let mut first: Option<(String, Vec<Picture>)> = None;
-        for (name, mut device, mode) in ways(k) {
-            let pictures: Vec<Picture> = scenes.iter().map(|(p, opaque)| draw(&mut device, mode, p, *opaque)).collect();
-            for (picture, (particles, opaque)) in pictures.iter().zip(&scenes) {
-                let (mut rays, mut got) = (Vec::new(), Vec::new());
-                for (y, x) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (y, x))) {
-                    let ray: Vec<Segment> =
-                        particles.iter().filter_map(|p| segment(p, x, y, f64::from(*opaque))).collect();
-                    let nearest = ray.iter().map(|s| s.t_enter).fold(f64::from(NO_CLOUD), f64::min);
-                    let index = (y * SIZE + x) as usize;
-                    let distance = f64::from(picture.nearest[index]);
-                    assert!(
-                        (distance - nearest).abs() <= 1e-3 * nearest.max(1.0),
-                        "{name}: nearest {distance} {nearest}"
-                    );
-                    if !ray.is_empty() {
-                        rays.push(ray);
-                        got.push(picture.cloud[index]);
+        let mut first: Option<(Blend, Vec<Picture>)> = None;
+        for (name, (mut device, _), mode) in ways(k) {
+            let mut draw = |(particles, opaque): &(Vec<Particle>, f32)| draw(&mut device, mode, particles, *opaque);
+            let pictures: Vec<Picture> = scenes.iter().map(&mut draw).collect();
+            for (scene, picture) in scenes.iter().zip(&pictures).take(2) {
+                assert!(draw(scene) == *picture, "{name}: another run, other bits");
+            }
+            // Both ways of `attachment` run one and the same shader.
+            let expected = first.as_ref().filter(|(first, _)| *first == mode).map(|(_, pictures)| pictures);
+            if let Some(expected) = expected {
+                assert!(pictures == *expected, "{name} differs from the other way");
+            } else {
+                for (picture, (pixels, rays)) in pictures.iter().zip(&rays) {
+                    let got: Vec<_> = pixels.iter().map(|pixel| picture.cloud[*pixel]).collect();
+                    assert_follows(&name, k, rays, &got);
+                    for (pixel, ray) in pixels.iter().zip(rays) {
+                        let nearest = ray.iter().map(|s| s.t_enter).fold(f64::from(NO_CLOUD), f64::min);
+                        let got = f64::from(picture.nearest[*pixel]);
+                        assert!((got - nearest).abs() <= 1e-3 * nearest.max(1.0), "{name}: nearest {got} {nearest}");
                     }
                 }
-                assert_follows(&format!("{name}, {} particles", particles.len()), k, &rays, &got);
-            }
-            match &first {
-                None => first = Some((name, pictures)),
-                Some((other, expected)) => {
-                    let same = |(a, b): (&Picture, &Picture)| a.cloud == b.cloud && a.nearest == b.nearest;
-                    assert!(pictures.iter().zip(expected).all(same), "{name} differs from {other}");
-                }
+                first = Some((mode, pictures));
             }
         }
     }
 }
 
+/// Whether a pipeline asks that its fragments read and write every attachment in turn, or what is wrong.
+fn ordered_feedback(desc: &PipelineDesc) -> Result<(), String> {
+    let PipelineKind::Graphics(state) = &desc.kind else { return Err("not a graphics pipeline".into()) };
+    let feedback = state.feedback.ok_or("fragments do not read what they write")?;
+    let subpass = vk::SubpassDescriptionFlags::RASTERIZATION_ORDER_ATTACHMENT_COLOR_ACCESS_EXT;
+    let blend = vk::PipelineColorBlendStateCreateFlags::RASTERIZATION_ORDER_ATTACHMENT_ACCESS_EXT;
+    if !feedback.subpass_flags().contains(subpass) || !feedback.blend_flags().contains(blend) {
+        return Err("order is not asked for".into());
+    }
+    let inputs: Vec<u32> = desc.program.bindings.iter().filter_map(|binding| binding.attachment).collect();
+    if inputs != (0..state.attachments.len() as u32).collect::<Vec<_>>() {
+        return Err(format!("attachments {inputs:?} of {} are read", state.attachments.len()));
+    }
+    if state.attachments.iter().any(|attachment| !matches!(attachment.blend, BlendState::Replace)) {
+        return Err("fixed-function blending changes what a fragment writes".into());
+    }
+    Ok(())
+}
+
 #[test]
-fn every_way_gives_the_same_bits_again() {
-    let mut random = Random(3);
-    let particles: Vec<Particle> = (0..30).map(|_| random.particle(220.0, 150.0)).collect();
+fn attachment_pipelines_ask_for_order_and_one_that_does_not_is_seen() {
+    // A software rasterizer keeps a pixel's fragments in order even where nobody asks: no picture shows a missing flag.
     for k in WINDOWS {
-        for (name, mut device, mode) in ways(k) {
-            let first = draw(&mut device, mode, &particles, NO_CLOUD);
-            for _ in 1..5 {
-                let again = draw(&mut device, mode, &particles, NO_CLOUD);
-                assert!(first.cloud == again.cloud && first.nearest == again.nearest, "{name}");
+        for (name, (_device, built), mode) in ways(k) {
+            if matches!(mode, Blend::Interlock(_)) {
+                continue;
             }
+            let good = built.graphics();
+            assert_eq!(ordered_feedback(&good), Ok(()), "{name}");
+            let broken = |change: &dyn Fn(&mut GraphicsState)| {
+                let mut desc = good.clone();
+                if let PipelineKind::Graphics(state) = &mut desc.kind {
+                    change(state);
+                }
+                ordered_feedback(&desc).unwrap_err()
+            };
+            assert!(broken(&|state| state.feedback = None).contains("do not read"));
+            assert!(broken(&|state| state.feedback.as_mut().unwrap().ordered = false).contains("order is not"));
+            assert!(broken(&|state| state.attachments.truncate(2)).contains("are read"));
+            assert!(broken(&|state| state.attachments[1].blend = BlendState::Min).contains("blending"));
         }
     }
 }

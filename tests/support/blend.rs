@@ -85,6 +85,7 @@ pub fn pixel(particles: &[Particle], x: u32, y: u32, opaque: f32) -> scene::Clou
     scene::Scene { ellipsoids }.pixel(DVec3::ZERO, dir, f64::from(opaque))
 }
 
+#[derive(PartialEq)]
 pub struct Picture {
     pub cloud: Vec<[f32; 4]>,
     pub nearest: Vec<f32>,
