@@ -21,7 +21,7 @@ macro_rules! scene_bindings {
             lights: $inputs.lights,
             medium: $inputs.medium,
             sky_light: $inputs.sky_light,
-            optical_depth_lut: $inputs.optical_depth_lut.sampled($crate::gpu::Sampler::LinearRepeatClampRepeat),
+            optical_depth_lut: $inputs.optical_depth_lut.sampled($crate::blend::OPTICAL_DEPTH_SAMPLER),
             scattering_lut: $inputs.scattering_lut.sampled($crate::gpu::Sampler::LinearClamp),
             detail_tile: $inputs.detail_tile.sampled($crate::gpu::Sampler::LinearRepeat),
             opaque_distance: $inputs.opaque_distance.sampled($crate::gpu::Sampler::NearestClamp),
@@ -37,7 +37,7 @@ mod list;
 pub mod medium;
 mod tiled;
 
-use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder};
+use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder, Sampler};
 use crate::grid::Counters;
 use crate::params::{Blend, Lighting, Precision, WINDOWS};
 use crate::renderer::ListUse;
@@ -253,3 +253,5 @@ impl Blender {
         }
     }
 }
+
+const OPTICAL_DEPTH_SAMPLER: Sampler = Sampler::LinearRepeatClampRepeat;
