@@ -49,8 +49,9 @@ vec4 screen_bounds(FrameParams frame, Particle p) {
                              c.z * c.z * syy - 2.0 * c.y * c.z * syz + c.y * c.y * szz + (syz * syz - syy * szz));
     vec2 half_size = sqrt(max(discriminant, 0.0));
     vec2 scale = 1.0 / (d33 * frame.tan_half_fov_y * vec2(frame.aspect, 1.0));
-    // A thousandth of slack covers the rounding of the bounds; the fragments decide exactly.
-    vec2 slack = 1e-3 * half_size * scale + 1e-6;
+    // A thousandth of slack covers the rounding of the bounds, and a sixteenth of a pixel the grid that corners are snapped
+    // to (Vulkan asks for 4 bits below the pixel, and SwiftShader has no more); the fragments decide exactly.
+    vec2 slack = 1e-3 * half_size * scale + 0.125 / vec2(frame.low_width, frame.low_height);
     vec4 bounds = vec4((middle - half_size) * scale - slack, (middle + half_size) * scale + slack);
     return clamp(bounds, vec4(-1.0), vec4(1.0));
 }
