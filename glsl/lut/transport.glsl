@@ -1,5 +1,5 @@
 // What the four passes of the multiple scattering solver share. One "job" is one total angular momentum j: the problem of
-// the ball decouples into these (docs/tables.md). Each pass runs for many jobs at once, gl_GlobalInvocationID.z picks one.
+// the ball decouples into these (docs/tables.md). Each pass runs for many jobs at once, one in a workgroup.
 //   transport_emit     sources on shells      → source at every point of every ray, in the frame of the ray
 //   transport_sweep    source along rays      → radiance along rays, in place
 //   transport_turn     radiance at shells     → in the frame of the radius
@@ -9,6 +9,7 @@
 #define WELKIN_LUT_TRANSPORT_GLSL
 
 const uint TRANSPORT_ORDERS = 33u;   // largest l_max + 1
+const uint TRANSPORT_BUCKET = 64u;   // size of a workgroup of transport_emit
 
 struct TransportJob {
     uint j;          // total angular momentum
@@ -21,10 +22,16 @@ struct TransportJob {
 
 struct TransportPoint {
     vec4 weights;    // of four consecutive shells
-    uint first;      // the first of them
     float cos_alpha; // angle from the radius vector to the direction of travel
     float sin_alpha;
-    uint crossing;   // 1: the point lies on shell `first` itself
+};
+
+// Points that lie between the same shells, so that what they read of the sources is the same for a whole workgroup.
+struct TransportBucket {
+    uint start;      // first place in the order of points
+    uint count;      // at most TRANSPORT_BUCKET
+    uint shell;      // first of the four shells
+    uint crossing;   // 1: the points lie on that shell itself
 };
 
 vec2 complex_multiply(vec2 a, vec2 b) {

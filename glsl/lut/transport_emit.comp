@@ -3,19 +3,26 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lut/transport.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = TRANSPORT_BUCKET) in;
 layout(binding = 0, std430) restrict readonly buffer Jobs { TransportJob at[]; } jobs;
-layout(binding = 1, std430) restrict readonly buffer Points { TransportPoint at[]; } points;
-layout(binding = 2, std430) restrict readonly buffer Basis { float at[]; } basis;          // [component][point]
-layout(binding = 3, std430) restrict readonly buffer Rotations { float at[]; } rotations;
-layout(binding = 4, std430) restrict readonly buffer Sources { float at[]; } sources;
-layout(binding = 5, std430) restrict writeonly buffer Field { vec2 at[]; } field;
+layout(binding = 1, std430) restrict readonly buffer Buckets { TransportBucket at[]; } buckets;
+layout(binding = 2, std430) restrict readonly buffer Order { uint at[]; } order;           // the points, bucket by bucket
+layout(binding = 3, std430) restrict readonly buffer Points { TransportPoint at[]; } points;
+layout(binding = 4, std430) restrict readonly buffer Basis { float at[]; } basis;          // [component][place in the order]
+layout(binding = 5, std430) restrict readonly buffer Rotations { float at[]; } rotations;
+layout(binding = 6, std430) restrict readonly buffer Sources { float at[]; } sources;
+layout(binding = 7, std430) restrict writeonly buffer Field { vec2 at[]; } field;
 layout(push_constant) uniform EmitPush { uint point_count; uint shell_count; uint l_max; };
 
+const uint BLOCK = 8u;   // orders about the normal that are summed at once
+
 void main() {
-    uint p = gl_GlobalInvocationID.x;
-    if (p >= point_count) return;
-    TransportJob job = jobs.at[gl_GlobalInvocationID.z];
+    // Jobs come first, so that the basis of a bucket stays in a cache until all have used it.
+    TransportJob job = jobs.at[gl_WorkGroupID.x];
+    TransportBucket bucket = buckets.at[gl_WorkGroupID.y];
+    if (gl_LocalInvocationID.x >= bucket.count) return;
+    uint place = bucket.start + gl_LocalInvocationID.x;
+    uint p = order.at[place];
     TransportPoint point = points.at[p];
 
     // Orders about the radius: a_m = Σ_l s_lm(r) y_lm(μ).
@@ -25,15 +32,13 @@ void main() {
     for (uint m = 0u; m <= m_max; ++m) {
         float sum = 0.0;
         for (uint l = m; l <= l_max; ++l, ++component) {
-            uint s = job.source + component * shell_count + point.first;
-            float value;
-            if (point.crossing != 0u) {
-                value = sources.at[s];
-            } else {
-                value = point.weights.x * sources.at[s] + point.weights.y * sources.at[s + 1u]
+            uint s = job.source + component * shell_count + bucket.shell;
+            float value = sources.at[s];
+            if (bucket.crossing == 0u) {
+                value = point.weights.x * value + point.weights.y * sources.at[s + 1u]
                       + point.weights.z * sources.at[s + 2u] + point.weights.w * sources.at[s + 3u];
             }
-            sum += value * basis.at[component * point_count + p];
+            sum += value * basis.at[component * point_count + place];
         }
         a[m] = sum;
     }
@@ -42,12 +47,18 @@ void main() {
     vec2 turn = vec2(point.cos_alpha, -point.sin_alpha);
     vec2 phase = (job.j & 1u) == 0u ? vec2(1.0, 0.0) : turn;
     turn = complex_multiply(turn, turn);
-    for (uint k = 0u; k <= job.j / 2u; ++k) {
-        uint row = job.rotation + k * (m_max + 1u);
-        vec2 c = vec2(0.0);
-        for (uint m = 0u; m <= m_max; m += 2u) c.x += rotations.at[row + m] * a[m];
-        for (uint m = 1u; m <= m_max; m += 2u) c.y += rotations.at[row + m] * a[m];
-        field.at[job.field + k * point_count + p] = complex_multiply(c, phase);
-        phase = complex_multiply(phase, turn);
+    uint last = job.j / 2u, width = m_max + 1u;
+    for (uint first = 0u; first <= last; first += BLOCK) {
+        vec2 c[BLOCK];
+        for (uint i = 0u; i < BLOCK; ++i) c[i] = vec2(0.0);
+        for (uint m = 0u; m <= m_max; ++m) {
+            vec2 part = (m & 1u) == 0u ? vec2(a[m], 0.0) : vec2(0.0, a[m]);
+            for (uint i = 0u; i < BLOCK; ++i) c[i] += rotations.at[job.rotation + min(first + i, last) * width + m] * part;
+        }
+        for (uint i = 0u; i < BLOCK; ++i) {
+            if (first + i > last) break;
+            field.at[job.field + (first + i) * point_count + p] = complex_multiply(c[i], phase);
+            phase = complex_multiply(phase, turn);
+        }
     }
 }

@@ -16,8 +16,10 @@ layout(binding = 6, std430) restrict writeonly buffer Sources { float at[]; } so
 layout(push_constant) uniform ProjectPush { uint shell_count; uint crossing_count; };
 
 void main() {
-    TransportJob job = jobs.at[gl_GlobalInvocationID.z];
-    uint component = gl_GlobalInvocationID.x / shell_count, shell = gl_GlobalInvocationID.x % shell_count;
+    // Jobs come first, as in transport_emit.
+    TransportJob job = jobs.at[gl_WorkGroupID.x];
+    uint index = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    uint component = index / shell_count, shell = index % shell_count;
     if (component >= job.components) return;
     uvec2 lm = components.at[component], range = ranges.at[shell];
     uint weight = component * crossing_count + range.x;

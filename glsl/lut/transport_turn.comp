@@ -12,6 +12,8 @@ layout(binding = 4, std430) restrict readonly buffer Field { vec2 at[]; } field;
 layout(binding = 5, std430) restrict writeonly buffer Orders { float at[]; } orders;       // [m][crossing]
 layout(push_constant) uniform TurnPush { uint point_count; uint crossing_count; uint l_max; };
 
+const uint BLOCK = 16u;   // orders that are summed at once
+
 void main() {
     uint x = gl_GlobalInvocationID.x;
     if (x >= crossing_count) return;
@@ -19,17 +21,21 @@ void main() {
     uint p = crossings.at[x];
     uint m_max = min(job.j, l_max);
 
-    float b[TRANSPORT_ORDERS];
-    for (uint m = 0u; m <= m_max; ++m) b[m] = 0.0;
-    vec2 turn = vec2(points.at[p].cos_alpha, points.at[p].sin_alpha);
-    vec2 phase = (job.j & 1u) == 0u ? vec2(1.0, 0.0) : turn;
-    turn = complex_multiply(turn, turn);
-    for (uint k = 0u; k <= job.j / 2u; ++k) {
-        uint row = job.rotation + k * (m_max + 1u);
-        vec2 c = complex_multiply(field.at[job.field + k * point_count + p], phase);
-        for (uint m = 0u; m <= m_max; m += 2u) b[m] += rotations.at[row + m] * c.x;
-        for (uint m = 1u; m <= m_max; m += 2u) b[m] += rotations.at[row + m] * c.y;
-        phase = complex_multiply(phase, turn);
+    vec2 square = complex_multiply(vec2(points.at[p].cos_alpha, points.at[p].sin_alpha),
+                                   vec2(points.at[p].cos_alpha, points.at[p].sin_alpha));
+    for (uint first = 0u; first <= m_max; first += BLOCK) {
+        float b[BLOCK];
+        for (uint i = 0u; i < BLOCK; ++i) b[i] = 0.0;
+        vec2 phase = (job.j & 1u) == 0u ? vec2(1.0, 0.0) : vec2(points.at[p].cos_alpha, points.at[p].sin_alpha);
+        for (uint k = 0u; k <= job.j / 2u; ++k) {
+            uint row = job.rotation + k * (m_max + 1u);
+            vec2 c = complex_multiply(field.at[job.field + k * point_count + p], phase);
+            // `first` is even: even orders meet the cosines, odd ones the sines.
+            for (uint i = 0u; i < BLOCK; ++i) b[i] += rotations.at[row + min(first + i, m_max)] * ((i & 1u) == 0u ? c.x : c.y);
+            phase = complex_multiply(phase, square);
+        }
+        for (uint i = 0u; i < BLOCK; ++i) {
+            if (first + i <= m_max) orders.at[job.order + (first + i) * crossing_count + x] = b[i];
+        }
     }
-    for (uint m = 0u; m <= m_max; ++m) orders.at[job.order + m * crossing_count + x] = b[m];
 }

@@ -27,11 +27,23 @@ struct Job {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 struct GpuPoint {
     weights: [f32; 4],
-    first: u32,
     cos_alpha: f32,
     sin_alpha: f32,
+    pad: [f32; 2],
+}
+
+/// Twin of `TransportBucket`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct Bucket {
+    start: u32,
+    count: u32,
+    shell: u32,
     crossing: u32,
 }
+
+/// Invocations in a workgroup: `TRANSPORT_BUCKET`.
+const GROUP: u32 = 64;
 
 /// Largest field and radiance arrays of one block of jobs [elements]; bounds memory whatever the resolution.
 const BLOCK_ELEMENTS: usize = 3 << 20;
@@ -58,6 +70,9 @@ impl Pipelines {
 
 /// A set of rays on the device.
 pub struct GpuRays {
+    buckets: Buffer,
+    bucket_count: usize,
+    order: Buffer,
     points: Buffer,
     basis: Buffer,
     /// First point and number of points of each ray.
@@ -69,29 +84,44 @@ pub struct GpuRays {
 
 impl GpuRays {
     fn new(gpu: &Arc<Gpu>, set: &RaySet, lms: usize) -> Result<Self> {
-        let mut crossing = vec![None; set.points.len()];
+        // Shell and whether a point lies on it: the same for all points of a bucket.
+        let mut places: Vec<(usize, bool)> = set.points.iter().map(|point| (point.first, false)).collect();
         for &(shell, point) in &set.crossings {
-            crossing[point] = Some(shell);
+            places[point] = (shell, true);
         }
-        let points: Vec<GpuPoint> = (set.points.iter().zip(&crossing))
-            .map(|(point, shell)| GpuPoint {
+        let mut order: Vec<u32> = (0..places.len() as u32).collect();
+        order.sort_by_key(|&p| places[p as usize]);
+        let mut buckets = Vec::new();
+        let mut start = 0;
+        for alike in order.chunk_by(|&a, &b| places[a as usize] == places[b as usize]) {
+            let (shell, crossing) = places[alike[0] as usize];
+            for bucket in alike.chunks(GROUP as usize) {
+                let count = bucket.len() as u32;
+                buckets.push(Bucket { start, count, shell: shell as u32, crossing: u32::from(crossing) });
+                start += count;
+            }
+        }
+        let points: Vec<GpuPoint> = (set.points.iter())
+            .map(|point| GpuPoint {
                 weights: point.weights.map(|w| w as f32),
-                first: shell.unwrap_or(point.first) as u32,
                 cos_alpha: point.cos as f32,
                 sin_alpha: point.sin as f32,
-                crossing: u32::from(shell.is_some()),
+                pad: [0.0; 2],
             })
             .collect();
         let count = points.len();
         let mut basis = vec![0.0f32; count * lms];
-        for p in 0..count {
+        for (place, &p) in order.iter().enumerate() {
             for c in 0..lms {
-                basis[c * count + p] = set.basis[p * lms + c] as f32;
+                basis[c * count + place] = set.basis[p as usize * lms + c] as f32;
             }
         }
         let steps: Vec<[f32; 4]> = set.points.iter().map(|point| point.step.map(|w| w as f32)).collect();
         let rays: Vec<[u32; 2]> = set.rays.iter().map(|&(first, count)| [first as u32, count as u32]).collect();
         Ok(Self {
+            buckets: Buffer::upload(gpu, "transport buckets", &buckets)?,
+            bucket_count: buckets.len(),
+            order: Buffer::upload(gpu, "transport order of points", &order)?,
             points: Buffer::upload(gpu, "transport points", &points)?,
             basis: Buffer::upload(gpu, "transport basis", &basis)?,
             rays: Buffer::upload(gpu, "transport rays", &rays)?,
@@ -272,6 +302,8 @@ impl<'a> DevicePlan<'a> {
         let count = block.len() as u32;
         let bindings = emit::Bindings {
             jobs,
+            buckets: &rays.buckets,
+            order: &rays.order,
             points: &rays.points,
             basis: &rays.basis,
             rotations: &self.rotations,
@@ -279,7 +311,7 @@ impl<'a> DevicePlan<'a> {
             field: &self.field,
         };
         let push = [rays.point_count as u32, self.plan.radii.len() as u32, self.plan.resolution.l_max as u32];
-        rec.dispatch(&self.pipelines.emit, &bindings, &push, [rays.point_count as u32, 1, count])?;
+        rec.dispatch(&self.pipelines.emit, &bindings, &push, [count * GROUP, rays.bucket_count as u32, 1])?;
         let bindings = sweep::Bindings { jobs, rays: &rays.rays, steps: &rays.steps, field: &self.field };
         let widest = block.iter().map(|job| job.j / 2 + 1).max().unwrap_or(1);
         let push = [rays.point_count as u32, rays.ray_count as u32];
@@ -311,7 +343,8 @@ impl<'a> DevicePlan<'a> {
         };
         let shells = self.plan.radii.len() as u32;
         let components = block.iter().map(|job| job.components).max().unwrap_or(1);
-        rec.dispatch(&self.pipelines.project, &bindings, &[shells, crossings], [components * shells, 1, count])
+        let groups = (components * shells).div_ceil(GROUP);
+        rec.dispatch(&self.pipelines.project, &bindings, &[shells, crossings], [count * GROUP, groups, 1])
     }
 
     /// Records the integration along the view rays, for all total angular momenta in order, into [`Self::field`].
