@@ -23,7 +23,7 @@
 #define WELKIN_LUT_SCATTERING_LOOKUP_GLSL
 
 // Shared with src/lut/axes.rs (asserted equal by tests/tables.rs).
-const float SCATTERING_LEVELS = 8.0;
+const float SCATTERING_LEVELS = 29.0;
 const float SCATTERING_R_MIN = 0.4;     // optical radius of level 0
 const float SCATTERING_R_MAX = 102.4;   // optical radius of the last level
 const float SCATTERING_MU_SCALE = 3.0;  // optical depth up to which chords are spaced evenly (tuned)

@@ -3,6 +3,7 @@
 //! GLSL twins: `glsl/lut/scattering_lookup.glsl` and `glsl/lut/optical_depth_lookup.glsl`, where the meaning of every
 //! coordinate is told.
 
+use super::transport::grid::interpolation;
 use crate::reference::sphere::RayCoordinates;
 use std::f64::consts::PI;
 
@@ -55,8 +56,15 @@ pub struct ScatteringShape {
     pub mu: u32,
 }
 
-/// Number of levels of optical radius.
-pub const LEVELS: u32 = 8;
+/// Number of levels of optical radius that the table holds: look-ups are linear between them.
+pub const LEVELS: u32 = STEPS * (DENSITY_LEVELS - 1) + 1;
+/// Number of levels that an octave of density apart would be: those of the paper, and of exported tables.
+pub const DENSITY_LEVELS: u32 = 8;
+/// Levels of the table from one density level to the next.
+pub const STEPS: u32 = 4;
+/// Optical radius from which solutions are a whole density level apart; below, where colours change from those of haze to
+/// those of cloud, half of one.
+const SOLVED_APART_FROM: f64 = 20.0;
 /// Optical radius of the first level; the thinnest ring-0 particle of the paper (0.07 1/m · 92 m · 2^-4).
 pub const R_MIN: f64 = 0.4;
 /// Optical radius of the last level. Colours are constant beyond.
@@ -111,6 +119,20 @@ impl ScatteringShape {
         R_MIN * (R_MAX / R_MIN).powf(f64::from(level) / f64::from(LEVELS - 1))
     }
 
+    /// Whether a level is solved; the others are filled in by a cubic through four that are.
+    pub fn solved(level: u32) -> bool {
+        let whole = Self::optical_radius(level) > SOLVED_APART_FROM;
+        level.is_multiple_of(if whole { STEPS } else { STEPS / 2 })
+    }
+
+    /// The levels that fill in one that is not solved, and their weights: Lagrange's cubic in log2 of the optical radius.
+    pub fn filled_from(level: u32) -> ([u32; 4], [f64; 4]) {
+        let solved: Vec<u32> = (0..LEVELS).filter(|&level| Self::solved(level)).collect();
+        let nodes: Vec<f64> = solved.iter().map(|&level| f64::from(level)).collect();
+        let (first, weights) = interpolation(&nodes, f64::from(level));
+        (std::array::from_fn(|k| solved[first + k]), weights)
+    }
+
     /// Level of an optical radius, a real number in `0..=LEVELS - 1`; inverse of [`Self::optical_radius`].
     pub fn level(optical_radius: f64) -> f64 {
         (optical_radius.clamp(R_MIN, R_MAX) / R_MIN).ln() / (R_MAX / R_MIN).ln() * f64::from(LEVELS - 1)
@@ -160,6 +182,18 @@ mod tests {
         }
         assert_eq!(ScatteringShape::optical_radius(0), R_MIN);
         assert_eq!(ScatteringShape::optical_radius(LEVELS - 1), R_MAX);
+    }
+
+    #[test]
+    fn density_levels_are_solved_and_cubics_are_filled_in_exactly() {
+        assert!((0..DENSITY_LEVELS).all(|level| ScatteringShape::solved(level * STEPS)));
+        let cubic = |level: u32| (f64::from(level) * 0.1 - 1.0).powi(3);
+        for level in (0..LEVELS).filter(|&level| !ScatteringShape::solved(level)) {
+            let (levels, weights) = ScatteringShape::filled_from(level);
+            assert!(levels.iter().all(|&level| ScatteringShape::solved(level)), "{level}: {levels:?}");
+            let filled: f64 = levels.iter().zip(weights).map(|(&level, weight)| weight * cubic(level)).sum();
+            assert!((filled - cubic(level)).abs() < 1e-12, "{level}: {levels:?} {weights:?}");
+        }
     }
 
     #[test]

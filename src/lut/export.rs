@@ -1,7 +1,7 @@
 //! The tables for other programs: plain arrays in C order with every axis named, and where the light goes.
 
 use super::Tables;
-use super::axes::{LEVELS, OpticalDepthShape, ScatteringShape};
+use super::axes::{DENSITY_LEVELS, OpticalDepthShape, STEPS, ScatteringShape};
 use crate::Result;
 use crate::gpu::Frames;
 use crate::reference::scattering::{
@@ -57,15 +57,18 @@ impl EnergyBalance {
 }
 
 impl Tables {
-    /// The energy balance of each level of optical radius.
+    /// The energy balance of each density level.
     pub fn energy(&self) -> Vec<EnergyBalance> {
+        let exported = |report: &&super::LevelReport| {
+            (0..DENSITY_LEVELS).any(|level| density_level(level) == report.optical_radius)
+        };
         let balance = |report: &super::LevelReport| EnergyBalance {
             optical_radius: report.optical_radius,
             transmitted: directly_transmitted(report.optical_radius),
             single: single_fraction(&self.params().medium, report.optical_radius),
             multiple: report.multiple,
         };
-        self.reports().iter().map(balance).collect()
+        self.reports().iter().filter(exported).map(balance).collect()
     }
 
     /// Reads the tables back: `optical_depth`, `first_matter`, `single`, `multiple`.
@@ -141,9 +144,15 @@ fn optical_depth(shape: OpticalDepthShape, texels: &[[f32; 2]]) -> [ExportTable;
     ]
 }
 
-/// `[theta][psi][mu][optical_radius]` from the image's `[level · n_mu + mu][psi][theta]`; models and opacity restored.
+/// Optical radius of a density level.
+fn density_level(level: u32) -> f64 {
+    ScatteringShape::optical_radius(level * STEPS)
+}
+
+/// `[theta][psi][mu][optical_radius]` from the image's `[level · n_mu + mu][psi][theta]`; models and opacity restored. Of the
+/// levels, only the density levels.
 fn scattering(shape: ScatteringShape, texels: &[[f32; 2]], albedo: f64) -> [ExportTable; 2] {
-    let radii: Vec<f64> = (0..LEVELS).map(ScatteringShape::optical_radius).collect();
+    let radii: Vec<f64> = (0..DENSITY_LEVELS).map(density_level).collect();
     let axes = vec![
         axis(
             "theta",
@@ -175,7 +184,7 @@ fn scattering(shape: ScatteringShape, texels: &[[f32; 2]], albedo: f64) -> [Expo
             for k in 0..shape.mu {
                 for (level, &r) in radii.iter().enumerate() {
                     let c = shape.coordinates([i, j, k], r);
-                    let texel = ((level as u32 * shape.mu + k) * shape.psi + j) * shape.theta + i;
+                    let texel = ((level as u32 * STEPS * shape.mu + k) * shape.psi + j) * shape.theta + i;
                     let [single, multiple] = texels[texel as usize].map(f64::from);
                     let (ray, opacity) = (c.ray(), opacity(2.0 * r * c.mu));
                     let single = (single + single_scattering_model(&ray, r)).max(0.0);
@@ -216,7 +225,8 @@ mod tests {
     fn exported_single_scattering_is_equation_9_at_its_own_coordinates() {
         // With nothing stored, what is exported is the closed-form model, which is within a few per cent of Eq. 9.
         let shape = ScatteringShape::COARSE;
-        let [single, multiple] = scattering(shape, &vec![[0.0, 0.25]; shape.level_len() * LEVELS as usize], 1.0);
+        let [single, multiple] =
+            scattering(shape, &vec![[0.0, 0.25]; shape.level_len() * crate::lut::axes::LEVELS as usize], 1.0);
         let length = |a: &ExportAxis| a.values[0].len();
         assert_eq!(single.axes.iter().map(length).product::<usize>(), single.values.len());
         let (theta, psi) = (&single.axes[0].values[0], &single.axes[1].values[0]);

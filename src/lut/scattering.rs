@@ -1,4 +1,5 @@
-//! The scattering table on the device (Yusov 4.2, 4.3): for each level of optical radius solve, then fill its texels.
+//! The scattering table on the device (Yusov 4.2, 4.3): solve for every second or fourth level of optical radius and fill
+//! its texels; then fill the levels between.
 
 use super::axes::{LEVELS, ScatteringShape};
 use super::transport::basis::{legendre, order_norm};
@@ -8,7 +9,7 @@ use super::transport::plan::{Beam, Plan, Resolution, rotations};
 use crate::Result;
 use crate::gpu::{Buffer, ComputePipeline, Frames, Gpu, Image, ImageDesc, Sampled, Sampler};
 use crate::reference::monte_carlo::{Medium, parallel};
-use crate::shaders::lut_scattering_comp as fill;
+use crate::shaders::{lut_scattering_between_comp as between, lut_scattering_comp as fill};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::f64::consts::PI;
@@ -23,6 +24,10 @@ const HOST_J: usize = 4;
 /// errs by less than 1e-3 even at the largest optical radius (measured: docs/tables.md).
 const TOLERANCE: f64 = 1e-5;
 
+/// Applications after which an iteration starts anew from where it is. The slowest, at the largest optical radius, need
+/// some 60 in one go and 100 if interrupted after 40.
+const RESTART: usize = 80;
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct FillPush {
@@ -32,7 +37,16 @@ struct FillPush {
     optical_radius: f32,
 }
 
-/// What was found out while building a level.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct BetweenPush {
+    levels: [u32; 4],
+    weights: [f32; 4],
+    level: u32,
+    pad: [u32; 3],
+}
+
+/// What was found out while solving a level.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LevelReport {
     /// Optical radius of the level.
@@ -92,7 +106,7 @@ impl ScatteringTable {
         self.shape
     }
 
-    /// Solves every level and fills the table. `orders`: stop after that many events instead of converging. `detail`
+    /// Solves the levels that are to be solved and fills the table. `orders`: stop after that many events instead of converging. `detail`
     /// scales the resolution (1 = full). `progress` is told the fraction done and may stop the build, which then returns
     /// `None`.
     pub fn build(
@@ -106,22 +120,23 @@ impl ScatteringTable {
         let gpu = frames.gpu().clone();
         let pipelines = Pipelines::new(&gpu)?;
         let pipeline = ComputePipeline::new(&gpu, &fill::PROGRAM, &[])?;
+        let (solved, rest): (Vec<u32>, Vec<u32>) = (0..LEVELS).partition(|&level| ScatteringShape::solved(level));
         let resolution = |level| Resolution::for_medium(medium, ScatteringShape::optical_radius(level), detail);
-        let j_max = (0..LEVELS).map(|level| resolution(level).j_max).max().unwrap_or(0);
+        let j_max = solved.iter().map(|&level| resolution(level).j_max).max().unwrap_or(0);
         let rotations = rotations(j_max);
         let harmonics = Buffer::upload(&gpu, "sun harmonics", &self.harmonics(j_max))?;
-        // Cost of a level grows about with the square of its resolution; good enough for a bar.
-        let cost: Vec<f32> = (0..LEVELS).map(|level| (level as f32 + 1.0).powi(3)).collect();
-        let total: f32 = cost.iter().sum();
+        // Time that a level takes grows about so (measured); good enough for a bar.
+        let cost = |level: u32| 1.0 + 0.6 * ScatteringShape::optical_radius(level).powf(0.75) as f32;
+        let total: f32 = solved.iter().map(|&level| cost(level)).sum();
         let (mut reports, mut done) = (Vec::new(), 0.0);
-        for level in 0..LEVELS {
+        for level in solved {
             let optical_radius = ScatteringShape::optical_radius(level);
             let mus: Vec<f64> = (0..self.shape.mu)
                 .map(|k| self.shape.coordinates([0, 0, k], optical_radius).mu.max(1e-3 / optical_radius))
                 .collect();
             let plan = Plan::new(medium, optical_radius, resolution(level), &mus);
             let device = DevicePlan::new(&gpu, &pipelines, &plan, &rotations)?;
-            let share = cost[level as usize] / total;
+            let share = cost(level) / total;
             let mut inner = |fraction: f32| progress(done + share * fraction);
             let Some((sources, report)) = solve(frames, &plan, &device, &rotations, orders, &mut inner)? else {
                 return Ok(None);
@@ -152,7 +167,25 @@ impl ScatteringTable {
             reports.push(report);
             done += share;
         }
+        self.fill_between(frames, &rest)?;
         Ok(progress(1.0).is_continue().then_some(reports))
+    }
+
+    /// Fills levels from those that are solved.
+    fn fill_between(&self, frames: &mut Frames, levels: &[u32]) -> Result<()> {
+        let pipeline = ComputePipeline::new(frames.gpu(), &between::PROGRAM, &[])?;
+        let [theta, psi, _] = self.table.extent();
+        frames.run(|rec| {
+            rec.pass("scattering table", |rec| {
+                for &level in levels {
+                    let (from, weights) = ScatteringShape::filled_from(level);
+                    let push = BetweenPush { levels: from, weights: weights.map(|w| w as f32), level, pad: [0; 3] };
+                    let bindings = between::Bindings { table: &self.table };
+                    rec.dispatch(&pipeline, &bindings, &push, [theta, psi, self.shape.mu])?;
+                }
+                Ok(())
+            })
+        })
     }
 
     /// Real harmonics of the sun's direction in the frame of the ray at each (Θ, ψ): `[j, k][direction]`, cosine and sine.
@@ -225,7 +258,7 @@ fn solve(
         return Ok(Some((sum, report)));
     }
 
-    let mut solvers: Vec<Gmres> = second.iter().map(|b| Gmres::new(b, TOLERANCE, 40)).collect();
+    let mut solvers: Vec<Gmres> = second.iter().map(|b| Gmres::new(b, TOLERANCE, RESTART)).collect();
     let mut round = 0;
     loop {
         let active: Vec<(usize, Vec<f64>)> = (solvers.iter().enumerate().skip(HOST_J))

@@ -17,7 +17,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Raised when the host's part of a computation changes, which the shaders' bytes do not tell.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// How finely tables are resolved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -85,6 +85,7 @@ impl TableParams {
             &shaders::lut_transport_turn_comp::PROGRAM,
             &shaders::lut_transport_project_comp::PROGRAM,
             &shaders::lut_scattering_comp::PROGRAM,
+            &shaders::lut_scattering_between_comp::PROGRAM,
         ];
         cache::file_name("scattering", &key, &programs.map(|program| program.stages[0].spirv))
     }
@@ -123,7 +124,47 @@ pub struct Tables {
     warnings: Vec<String>,
 }
 
+/// Finished tables in the host's memory, on their way from one device to another.
+#[derive(Clone, Debug)]
+pub struct TableData {
+    params: TableParams,
+    optical_depth: Vec<u8>,
+    scattering: Vec<u8>,
+    reports: Vec<LevelReport>,
+    fill: f32,
+    built: bool,
+    seconds: f64,
+    warnings: Vec<String>,
+}
+
 impl Tables {
+    /// Copies the tables to the host, for [`Self::upload`] to another device.
+    pub fn download(&self, frames: &mut Frames) -> Result<TableData> {
+        Ok(TableData {
+            params: self.params,
+            optical_depth: download(frames, self.optical_depth.image())?,
+            scattering: download(frames, self.scattering.image())?,
+            reports: self.reports.clone(),
+            fill: self.fill,
+            built: self.built,
+            seconds: self.seconds,
+            warnings: self.warnings.clone(),
+        })
+    }
+
+    /// Tables that another device has made.
+    pub fn upload(frames: &mut Frames, data: TableData) -> Result<Self> {
+        let gpu = frames.gpu().clone();
+        let (depth_shape, scattering_shape, _) = data.params.shapes();
+        let TableData { params, optical_depth, scattering, reports, fill, built, seconds, warnings } = data;
+        let (depth_bytes, scattering_bytes) = (optical_depth, scattering);
+        let optical_depth = OpticalDepthTable::new(&gpu, depth_shape)?;
+        let scattering = ScatteringTable::new(&gpu, scattering_shape)?;
+        upload(frames, optical_depth.image(), &depth_bytes)?;
+        upload(frames, scattering.image(), &scattering_bytes)?;
+        Ok(Self { params, optical_depth, scattering, reports, fill, built, seconds, warnings })
+    }
+
     /// Reads the tables from `cache`, or builds them and writes them there; without a cache directory they are built.
     ///
     /// A damaged or unwritable cache is no error: it leads to a warning, see [`Self::warnings`]. `progress` may stop the
@@ -163,7 +204,7 @@ impl Tables {
 
         let path = cache.map(|directory| directory.join(params.scattering_file()));
         let image = image_bytes(tables.scattering.image());
-        let report = LEVELS as usize * LevelReport::BYTES;
+        let report = reports_bytes();
         match tables.look_up(path.as_deref(), image + report) {
             Some(bytes) => {
                 upload(frames, tables.scattering.image(), &bytes[..image])?;
@@ -191,7 +232,7 @@ impl Tables {
         let bytes = |extent: [u32; 3]| extent.iter().product::<u32>() as usize * 4;
         let found = |file: String, length| matches!(cache::read(&cache.join(file), length), Cached::Found(_));
         found(params.optical_depth_file(), bytes(depth.image_extent()))
-            && found(params.scattering_file(), bytes(scattering.image_extent()) + LEVELS as usize * LevelReport::BYTES)
+            && found(params.scattering_file(), bytes(scattering.image_extent()) + reports_bytes())
     }
 
     fn look_up(&mut self, path: Option<&Path>, length: usize) -> Option<Vec<u8>> {
@@ -233,7 +274,7 @@ impl Tables {
         self.fill
     }
 
-    /// Per level of optical radius: how the solution went.
+    /// Per solved level of optical radius: how the solution went.
     pub fn reports(&self) -> &[LevelReport] {
         &self.reports
     }
@@ -276,6 +317,10 @@ pub(crate) fn central_fill(style: Style, seed: u32) -> f32 {
         })
         .sum();
     (sum / f64::from(n)) as f32
+}
+
+fn reports_bytes() -> usize {
+    (0..LEVELS).filter(|&level| ScatteringShape::solved(level)).count() * LevelReport::BYTES
 }
 
 fn image_bytes(image: &Image) -> usize {
