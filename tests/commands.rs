@@ -187,3 +187,22 @@ fn tables_are_made_once_read_from_the_cache_and_made_anew_when_damaged() {
     assert!(made(&again) && stderr(&again).contains("warning"), "{}", stderr(&again));
     assert!(std::fs::read(out.join("multiple.npy")).unwrap() == first, "rebuilt tables differ");
 }
+
+#[test]
+fn a_sequence_may_start_on_reduced_tables_and_leaves_the_cache_whole() {
+    let directory = directory(&FLAT.replace("\"flat\"", "\"tables\""));
+    let path = directory.path();
+    run(path, "render sky.toml --size 32x24 --frames 0..3 --tables progressive --stats s.json -o out.png");
+    let stats = json(&path.join("s.json"));
+    let lit: Vec<_> = stats["frames"].as_array().unwrap().iter().map(|frame| frame["tables"].clone()).collect();
+    // No machine makes full tables before the first frame is recorded; the command ends without waiting for them.
+    assert_eq!((lit.len(), &lit[0]), (3, &serde_json::json!("reduced")));
+    assert_eq!(stats["tables"]["size"], lit[2]);
+    assert_eq!(stats["validation_messages"], 0);
+    let names = files(&path.join("cache"));
+    assert!(names.len() >= 2 && names.iter().all(|name| name.ends_with(".table")), "{names:?}");
+
+    let output = run(path, "render sky.toml --size 32x24 --tables reduced --stats s.json -o out.png");
+    assert!(!stderr(&output).contains("warning"), "{}", stderr(&output));
+    assert_eq!(json(&path.join("s.json"))["tables"]["from"], "cache");
+}

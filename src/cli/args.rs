@@ -71,6 +71,8 @@ pub enum TablesArg {
     Full,
     /// Reduced ones, made in a few seconds
     Reduced,
+    /// Reduced ones at once, and the full ones from the frame on by which they have been made beside the rendering
+    Progressive,
 }
 
 /// Where a scene's values, device and tables come from.

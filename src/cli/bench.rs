@@ -29,6 +29,8 @@ struct Report {
 #[derive(Serialize)]
 struct Side {
     blend: BlendStats,
+    /// Size of the tables that lit the last frame.
+    tables: Option<String>,
     frame: Times,
     passes: Vec<Pass>,
 }
@@ -122,7 +124,8 @@ pub fn run(args: &BenchArgs) -> Result<()> {
 fn side(contender: &Contender) -> Side {
     let times = |values: &[f64]| Times { median_ms: median(values).unwrap_or(0.0), p95_ms: p95(values).unwrap_or(0.0) };
     let passes = contender.passes.iter().map(|(name, values)| Pass { name: name.into(), times: times(values) });
-    Side { blend: contender.session.blend(), frame: times(&contender.totals), passes: passes.collect() }
+    let tables = contender.session.tables().map(|tables| tables.size);
+    Side { blend: contender.session.blend(), tables, frame: times(&contender.totals), passes: passes.collect() }
 }
 
 fn ratio(a: &Side, b: &Side) -> Ratio {
@@ -168,6 +171,7 @@ mod tests {
         let passes = [("grid", 1.0), ("blend", blend_ms)];
         Side {
             blend: BlendStats { requested: used.into(), used: used.into(), reason: "asked for".into() },
+            tables: None,
             frame: times(1.0 + blend_ms),
             passes: passes.into_iter().map(|(name, ms)| Pass { name: name.into(), times: times(ms) }).collect(),
         }

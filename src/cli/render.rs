@@ -59,7 +59,6 @@ fn render(args: &RenderArgs, job: &Job<'_>, device: &mut Device) -> Result<Stats
         width: size.width,
         height: size.height,
         blend: session.blend(),
-        tables: session.tables(),
         ..Stats::default()
     };
     let (mut passes, mut totals) = (PassTimes::default(), Vec::new());
@@ -81,7 +80,9 @@ fn render(args: &RenderArgs, job: &Job<'_>, device: &mut Device) -> Result<Stats
         stats.particles = made.particles;
         stats.capacity = made.capacity;
         let output = output.display().to_string();
-        stats.frames.push(FrameStats { frame, output, gpu_ms: times.gpu_ms, wall_ms: times.wall_ms });
+        stats.tables = session.tables();
+        let tables = stats.tables.as_ref().map(|tables| tables.size.clone());
+        stats.frames.push(FrameStats { frame, output, gpu_ms: times.gpu_ms, wall_ms: times.wall_ms, tables });
         if let Some(progress) = &mut progress {
             progress.set(done as u64 + 1);
         }

@@ -6,15 +6,15 @@ use std::time::Instant;
 use welkin::blend::supports;
 use welkin::gpu::standalone::{Options, Standalone, validation_available};
 use welkin::gpu::{Buffer, BufferKind, Frames, Image, ImageDesc};
-use welkin::lut::Tables;
 use welkin::output::{BlendStats, CapacityStats, DeviceStats, ParticleStats, PassStats, Picture, TableStats};
 use welkin::params::{Blend, Lighting, Params, Precision, Style};
 use welkin::renderer::{ListUse, Renderer, TableImages};
 use welkin::{Error, Result};
 
 use super::args::{PictureArgs, SceneArgs, Size};
+use super::places;
 use super::progress::note;
-use super::{places, tables};
+use super::tables::TableSet;
 
 /// The device in use.
 pub struct Device(Standalone);
@@ -78,7 +78,7 @@ const MAX_TURNS: usize = 8;
 /// A renderer for one scene.
 pub struct Session {
     renderer: Renderer,
-    tables: Option<(Tables, TableStats)>,
+    tables: Option<TableSet>,
     /// Stands in for tables that nothing reads.
     unused: Image,
     scene: Buffer,
@@ -97,7 +97,7 @@ impl Session {
             Lighting::Flat if params.clouds.style == Style::Homogeneous => None,
             _ => {
                 let cache = places::cache(args.scene.cache.as_deref())?;
-                Some(tables::obtain(frames, params, args.tables, &cache)?)
+                Some(TableSet::obtain(frames, params, args.tables, &cache, args.scene.device.as_deref())?)
             }
         };
         let unused = ImageDesc {
@@ -129,7 +129,7 @@ impl Session {
     }
 
     pub fn tables(&self) -> Option<TableStats> {
-        self.tables.as_ref().map(|(_, stats)| stats.clone())
+        self.tables.as_ref().map(|set| set.stats().clone())
     }
 
     /// Renders a frame and reads it back.
@@ -166,8 +166,11 @@ impl Session {
         let started = Instant::now();
         let frames = device.0.frames();
         let gpu = frames.gpu().clone();
+        if let Some(set) = &mut self.tables {
+            set.improve(frames)?;
+        }
         let unused = TableImages { optical_depth: &self.unused, scattering: &self.unused, fill: 1.0 };
-        let tables = self.tables.as_ref().map_or(unused, |(tables, _)| TableImages {
+        let tables = self.tables.as_ref().map(TableSet::tables).map_or(unused, |tables| TableImages {
             optical_depth: tables.optical_depth.image(),
             scattering: tables.scattering.image(),
             fill: tables.fill(),

@@ -112,6 +112,8 @@ pub struct FrameStats {
     pub gpu_ms: Option<f64>,
     /// Time from the call to the picture in host memory [ms].
     pub wall_ms: f64,
+    /// Size of the tables that lit it, `full` or `reduced`; `null` when the scene needs none.
+    pub tables: Option<String>,
 }
 
 #[cfg(test)]
