@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::lut::transport::device::{DevicePlan, Pipelines};
+use welkin::lut::transport::grid::interpolation;
 use welkin::lut::transport::plan::{Plan, Resolution, rotations};
 use welkin::reference::monte_carlo::{Medium, balance, multiple_scattering, next_uniform, parallel};
 use welkin::reference::phase::PhaseFunction::{self, CornetteShanks, HenyeyGreenstein};
@@ -77,7 +78,7 @@ fn a_uniformly_lit_ball_without_absorption_shines_as_its_surroundings() {
     // White furnace: light from everywhere, of radiance 1. What is transmitted and scattered along any ray is 1 again.
     for (phase, g_sun, g) in [(CornetteShanks, 0.7, 0.7), (HenyeyGreenstein, 0.85, 0.85)] {
         let medium = medium(phase, g_sun, g, 1.0);
-        for r in [0.4, 4.3] {
+        for r in [0.4, 4.3, 102.4] {
             let mus = [0.02, 0.3, 0.7, 1.0];
             let mut resolution = Resolution::for_medium(&medium, r, 1.0);
             resolution.j_max = 0; // only the mean over the sun's directions is asked for
@@ -97,6 +98,57 @@ fn a_uniformly_lit_ball_without_absorption_shines_as_its_surroundings() {
                 assert!((total - 1.0).abs() < 0.01, "{medium:?} R = {r} mu = {mu}: {total}");
             }
         }
+    }
+}
+
+#[test]
+fn light_takes_the_same_way_back() {
+    // Reciprocity of transport: what source b sends to detector a, source a sends to detector b with all directions turned
+    // round. In the solver's harmonics turning round is (-1)^l, and orders m > 0 count twice (their cosines are not
+    // normalised). Every step of the operator is in it: interpolation, rotation, integration along rays, projection.
+    let medium = medium(HenyeyGreenstein, 0.7, 0.7, 1.0);
+    for (r, j) in [(0.5, 2), (3.0, 5), (20.0, 0), (20.0, 9)] {
+        let plan = Plan::new(&medium, r, Resolution::for_medium(&medium, r, 1.0), &[1.0]);
+        let (shells, components) = (plan.radii.len(), plan.components(j));
+        let rotation = &rotations(j)[j];
+        // Smooth sources of the first degrees.
+        let source = |seed: u64| -> Vec<f64> {
+            let mut state = seed;
+            let mut source = vec![0.0; components * shells];
+            for (c, &(l, m)) in plan.lm[..components].iter().enumerate().filter(|(_, lm)| lm.0 <= 4) {
+                let (strength, slope) = (next_uniform(&mut state) - 0.5, 4.0 * next_uniform(&mut state));
+                for (i, radius) in plan.radii.iter().enumerate() {
+                    source[c * shells + i] = strength * radius.powi((l + m + j) as i32 % 3) * (slope * radius).cos();
+                }
+            }
+            source
+        };
+        let transported = |source: &[f64]| {
+            let mut field = plan.emit(&plan.inner, j, rotation, source);
+            plan.sweep(&plan.inner, j, &mut field);
+            plan.scatter(j, rotation, &field)
+        };
+        // ∫ r² dr by Gauss–Legendre through the solver's own cubics.
+        let (nodes, weights) = gauss_legendre(40);
+        let pairing = |a: &[f64], b: &[f64]| -> f64 {
+            let mut sum = 0.0;
+            for (x, w) in nodes.iter().zip(&weights) {
+                let at = 0.5 * (1.0 + x);
+                let (first, cubic) = interpolation(&plan.radii, at);
+                let value = |s: &[f64], c: usize| -> f64 { (0..4).map(|k| cubic[k] * s[c * shells + first + k]).sum() };
+                for (c, &(l, m)) in plan.lm[..components].iter().enumerate() {
+                    let sign = if l % 2 == 0 { 1.0 } else { -1.0 } * if m == 0 { 1.0 } else { 2.0 };
+                    sum += 0.5 * w * at * at * sign * value(a, c) * value(b, c) / plan.moments[l];
+                }
+            }
+            sum
+        };
+        let (a, b) = (source(3), source(4));
+        let (there, back) = (pairing(&a, &transported(&b)), pairing(&b, &transported(&a)));
+        let size = pairing(&a, &transported(&a)).abs().max(pairing(&b, &transported(&b)).abs());
+        println!("R = {r}, j = {j}: {there:.6} {back:.6} of {size:.6}");
+        assert!((there - back).abs() < 2e-3 * size, "R = {r}, j = {j}: {there} {back}, of {size}");
+        assert!(there.abs() > 1e-2 * size, "nothing was compared: {there} of {size}");
     }
 }
 
