@@ -195,10 +195,10 @@ fn look_ups_have_no_bias_at_levels_and_between() {
     }
 }
 
-/// Twin of `ProbeRay`.
+/// Twin of `LookupRay`.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct ProbeRay {
+struct LookupRay {
     entry: [f32; 3],
     optical_radius: f32,
     dir: [f32; 3],
@@ -216,12 +216,12 @@ fn the_device_looks_tables_up_as_the_oracle_does() {
     let rays: Vec<(RayCoordinates, f64)> = (0..20_000)
         .map(|_| (random_ray(&mut state), 0.1 * 2000f64.powf(next_uniform(&mut state)))) // 0.1..200: beyond both ends
         .collect();
-    let probes: Vec<ProbeRay> = (rays.iter())
+    let probes: Vec<LookupRay> = (rays.iter())
         .map(|(c, r)| {
             let ray = c.ray();
             let v = |v: DVec3| v.as_vec3().to_array();
             let (entry, dir, to_sun) = (v(ray.entry), v(ray.dir), v(ray.to_sun));
-            ProbeRay { entry, optical_radius: *r as f32, dir, pad_a: 0.0, to_sun, pad_b: 0.0 }
+            LookupRay { entry, optical_radius: *r as f32, dir, pad_a: 0.0, to_sun, pad_b: 0.0 }
         })
         .collect();
     let source = Buffer::upload(&gpu, "rays", &probes).unwrap();

@@ -4,17 +4,17 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lut/scattering_lookup.glsl"
 
-struct ProbeRay { vec3 entry; float optical_radius; vec3 dir; float pad_a; vec3 to_sun; float pad_b; };
+struct LookupRay { vec3 entry; float optical_radius; vec3 dir; float pad_a; vec3 to_sun; float pad_b; };
 
 layout(local_size_x = 64) in;
-layout(binding = 0, std430) restrict readonly buffer Rays { ProbeRay at[]; } rays;
+layout(binding = 0, std430) restrict readonly buffer Rays { LookupRay at[]; } rays;
 layout(binding = 1, std430) restrict writeonly buffer Found { vec2 at[]; } found;
 layout(binding = 2) uniform sampler3D table;
-layout(push_constant) uniform ProbePush { uint count; };
+layout(push_constant) uniform LookupPush { uint count; };
 
 void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= count) return;
-    ProbeRay ray = rays.at[index];
+    LookupRay ray = rays.at[index];
     found.at[index] = scattering_source_lookup(table, ray.entry, ray.dir, ray.to_sun, ray.optical_radius);
 }
