@@ -63,6 +63,9 @@ fn devices_says_why_a_mode_cannot_be_used() {
     assert!(!devices.is_empty());
     for mode in devices.iter().flat_map(|device| device["blend"].as_array().unwrap()) {
         assert_ne!(mode["supported"].as_bool().unwrap(), mode["reason"].is_string(), "{mode}");
+        let windows = mode["windows"].as_array();
+        assert_eq!(windows.is_some(), mode["mode"] == "interlock" || mode["mode"] == "attachment", "{mode}");
+        assert!(windows.is_none_or(|k| k.is_empty() != mode["supported"].as_bool().unwrap()), "{mode}");
     }
     assert!(report["pipelines"].is_null());
     assert!(stdout(&run(directory.path(), "devices")).contains("interlock"));

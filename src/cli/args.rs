@@ -99,7 +99,7 @@ pub struct RenderArgs {
     /// .png holds the toned picture; .exr and .npy hold linear scene radiance, height x width x 3.
     #[arg(short, long, value_name = "OUT.{png,exr,npy}")]
     pub output: Option<PathBuf>,
-    /// How overlapping particles are composited: auto, interlock[:K], alpha
+    /// How overlapping particles are composited: auto, interlock[:K], attachment[:K], list, tiled, alpha; docs/blending.md compares them
     #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
     pub blend: Option<Blend>,
     #[command(flatten)]
@@ -235,7 +235,7 @@ pub struct BenchArgs {
     /// Print JSON (docs/json.md)
     #[arg(long)]
     pub json: bool,
-    /// How overlapping particles are composited: auto, interlock[:K], alpha
+    /// How overlapping particles are composited: auto, interlock[:K], attachment[:K], list, tiled, alpha; docs/blending.md compares them
     #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
     pub blend: Option<Blend>,
     /// Compare with this mode in the same run, frame by frame in turns

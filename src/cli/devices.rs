@@ -7,7 +7,7 @@ use welkin::Result;
 use welkin::frame::{Output, OutputKind};
 use welkin::gpu::standalone::{self, Options, Standalone};
 use welkin::gpu::{Capabilities, Feature};
-use welkin::params::{BLENDS, Blend, Params};
+use welkin::params::{BLENDS, Blend, Params, WINDOWS};
 use welkin::renderer::Renderer;
 
 use super::args::DevicesArgs;
@@ -41,6 +41,8 @@ struct Mode {
     mode: &'static str,
     #[serde(flatten)]
     answer: Answer,
+    /// The windows K that the mode can have here; null for a mode without one.
+    windows: Option<Vec<u32>>,
 }
 
 #[derive(Serialize, Clone)]
@@ -75,8 +77,22 @@ fn pipelines() -> Result<Vec<String>> {
 
 fn describe(index: usize, device: &Capabilities) -> Device {
     let modes = BLENDS.iter().filter(|row| row.value != Blend::Auto);
-    let blend: Vec<_> =
-        modes.map(|row| Mode { mode: row.name, answer: supports(device, row.value, row.here).into() }).collect();
+    let blend: Vec<_> = modes
+        .map(|row| {
+            let windows = |of: fn(u32) -> Blend| {
+                Some(WINDOWS.into_iter().filter(|k| supports(device, of(*k), row.here).is_ok()).collect())
+            };
+            Mode {
+                mode: row.name,
+                answer: supports(device, row.value, row.here).into(),
+                windows: match row.value {
+                    Blend::Interlock(_) => windows(Blend::Interlock),
+                    Blend::Attachment(_) => windows(Blend::Attachment),
+                    _ => None,
+                },
+            }
+        })
+        .collect();
     Device {
         index,
         name: device.device_name.clone(),
@@ -115,8 +131,10 @@ fn text(report: &Report) -> String {
         let Device { index, name, kind, driver, api, .. } = device;
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{index}: {name} ({kind}, Vulkan {api}, {driver})");
-        for Mode { mode, answer } in &device.blend {
-            let _ = writeln!(text, "   {mode:<12} {}", answer_text(answer));
+        for Mode { mode, answer, windows } in &device.blend {
+            let windows = windows.as_ref().filter(|windows| !windows.is_empty());
+            let windows = windows.map(|windows| format!(", K of {windows:?}")).unwrap_or_default();
+            let _ = writeln!(text, "   {mode:<12} {}{windows}", answer_text(answer));
         }
         let _ = writeln!(text, "   {:<12} {}", "auto", device.auto.as_deref().unwrap_or("none"));
         let _ = writeln!(text, "   {:<12} {}", "timestamps", answer_text(&device.timestamps));
