@@ -170,9 +170,11 @@
 //!   (`tests/blend.rs::transmittance_is_exactly_the_sum_of_optical_depths_in_any_order`)
 //! - **Front and back each belong to whichever particle owns them**, so that containment is right too; the
 //!   paper gives the front to one and the back to the other. (`src/reference/segments.rs::the_merge_is_exact_for_two_in_either_order_containment_included`)
-//! - **The merge is the paper's, K = 1**: exact for two overlapping particles, approximate for three or more.
+//! - **The merge is the paper's by default, K = 1**: exact for two overlapping particles, approximate for three or more.
 //!   (`tests/blend.rs::two_overlapping_ellipsoids_match_the_exact_integral_under_interlock`,
 //!   `src/reference/segments.rs::three_overlapping_segments_tell_the_modes_apart`)
+//! - **A window of K = 2, 4 or 8 pending segments** can be had in place of one, in storage images or in attachments: overlaps
+//!   are split, and what is expected to cost least is merged or committed. (`tests/window.rs::the_error_falls_with_the_window_as_expected`)
 //!
 //! Air (Yusov 5.6 uses Bruneton's tables and epipolar sampling; here Hillaire, *A Scalable and Production Ready Sky*, 2020):
 //! - **Aerosol single scattering is stored without its phase function**, so that the aureole stays sharp, and **aerial
