@@ -98,6 +98,7 @@
 //! [`renderer`] records them in this order; a stage reads what earlier ones wrote. [`gpu`] is the layer below, which derives
 //! every barrier from what the shaders declare. [`params`] say what is rendered; `scene` reads them from a file, `output`
 //! writes pictures and tables, `compare` measures pictures against a reference (all with feature `files`); [`reference`](mod@reference) holds the oracles: one plain CPU implementation for each stage.
+//! `conform` (with its feature) tries what a driver must do for all this.
 //!
 //! # Units and conventions
 //! - SI units: metres, 1/m for extinction. Radiance is spectral, W m⁻² sr⁻¹ nm⁻¹, at 680, 550 and 440 nm for r, g and b; angles

@@ -21,8 +21,7 @@ const WHY: &str = "Mode `attachment` merges a particle into its pixel by reading
     that reads before the one drawn earlier has written leaves a wrong pixel";
 const SPEC: &str = "VK_EXT_rasterization_order_attachment_access; VK_KHR_dynamic_rendering_local_read; Vulkan, \
     Rasterization Order and Render Pass";
-const STATIC: &str = ". Also statically: the description from which pipeline and subpass get their flags asks for \
-    rasterization order";
+const STATIC: &str = ". Also statically: the flags that pipeline and subpass are made with ask for rasterization order";
 
 /// Everything that tells order can be broken in every way.
 const FAILS: [Sabotage; 5] =
@@ -169,8 +168,12 @@ fn pipeline(
     };
     let pipeline = GraphicsPipeline::new(lab.gpu(), program, constants, state)?;
     let asks = match &pipeline.desc().kind {
-        PipelineKind::Graphics(state) => state.feedback.is_some_and(|feedback| feedback.ordered),
-        PipelineKind::Compute => false,
+        PipelineKind::Graphics(GraphicsState { feedback: Some(feedback), .. }) => {
+            let subpass = vk::SubpassDescriptionFlags::RASTERIZATION_ORDER_ATTACHMENT_COLOR_ACCESS_EXT;
+            let blend = vk::PipelineColorBlendStateCreateFlags::RASTERIZATION_ORDER_ATTACHMENT_ACCESS_EXT;
+            feedback.subpass_flags().contains(subpass) && feedback.blend_flags().contains(blend)
+        }
+        _ => false,
     };
     if asks == way.barriers && lab.sabotage() != Some(Sabotage::UnorderedUnseen) {
         let flag = "RASTERIZATION_ORDER_ATTACHMENT_ACCESS";

@@ -30,6 +30,7 @@ mod attachment;
 mod beyond;
 mod blocks;
 mod glob;
+mod images;
 mod interlock;
 mod lab;
 mod merges;
@@ -241,6 +242,7 @@ pub fn checks() -> Vec<Check> {
     beyond::add(&mut list);
     attachment::add(&mut list);
     blocks::add(&mut list);
+    images::add(&mut list);
     list
 }
 
