@@ -16,6 +16,7 @@ pub(super) struct Interlock {
 }
 
 /// What a pixel keeps between fragments; zeros are nothing pending, nothing committed.
+#[allow(clippy::large_enum_variant)] // A renderer has one.
 enum State {
     Single { committed: Image, pending: Image, ends: Image },
     Window(Image),

@@ -76,7 +76,7 @@ impl Preset {
     }
 }
 
-/// The windows that [`Blend::Interlock`] and [`Blend::Attachment`] come in [segments].
+/// The windows that [`Blend::Interlock`] and [`Blend::Attachment`] come in: numbers of segments.
 pub const WINDOWS: [u32; 4] = [1, 2, 4, 8];
 
 impl Default for Quality {

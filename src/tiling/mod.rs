@@ -35,6 +35,7 @@ pub enum ListOrder {
     Sort,
 }
 
+#[allow(clippy::large_enum_variant)] // A renderer has one.
 enum Insertion {
     Interlock(Box<Interlocked>),
     Sort { bin: ComputePipeline, order: ComputePipeline },
