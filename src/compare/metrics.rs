@@ -40,7 +40,7 @@ pub struct Metrics {
     pub rmse: f64,
     /// Mean of (I − R)² / (R² + 0.01) over pixels and channels of linear radiance.
     pub rel_mse: f64,
-    /// Peak signal-to-noise ratio of the pictures as shown (toned, sRGB-encoded, peak 1) [dB]; none of equal pictures.
+    /// Peak signal-to-noise ratio of the pictures as shown (toned, sRGB-encoded, peak 1), in dB; none of equal pictures.
     pub psnr: Option<f64>,
     /// Mean ꟻLIP of the pictures as shown, 0 to 1.
     pub flip_mean: f64,

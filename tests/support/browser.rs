@@ -90,10 +90,10 @@ impl Browser {
         answer["result"]["value"].take()
     }
 
-    /// Waits until `expression` is true; at most some ten seconds.
+    /// Waits until `expression` is true; at most half a minute, which a busy machine may need.
     pub fn until(&mut self, expression: &str) {
         let script = format!(
-            "new Promise((resolve, reject) => {{ const end = Date.now() + 10000; (function look() {{ \
+            "new Promise((resolve, reject) => {{ const end = Date.now() + 30000; (function look() {{ \
              if ({expression}) resolve(true); else if (Date.now() > end) resolve(false); else setTimeout(look, 20); }})(); }})"
         );
         assert_eq!(self.value(&script), json!(true), "{expression} never came true");
