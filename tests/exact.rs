@@ -5,7 +5,10 @@ mod support;
 
 use support::{Picture, Random, SIZE, ball, draw, draw_with_budget, open, pixel};
 use welkin::blend::{NO_CLOUD, NodeBudget};
+use welkin::gpu::standalone::Standalone;
+use welkin::gpu::{Buffer, ComputePipeline};
 use welkin::params::Blend;
+use welkin::shaders::probe_rounds_comp as probe;
 use welkin::shared::Particle;
 
 const MODES: &[Blend] = &[Blend::List, Blend::Tiled];
@@ -156,9 +159,31 @@ fn a_list_that_is_too_short_grows_until_nothing_is_lost() {
     }
 }
 
+/// Whether shaders may loop as often as they say. Mesa 22.3's llvmpipe ends all loops of a thread after 65 535 rounds.
+fn loops_end_only_when_done(device: &mut Standalone) -> bool {
+    const ROUNDS: u32 = 1_000_000;
+    let gpu = device.gpu().clone();
+    let rounds = Buffer::upload(&gpu, "rounds", &[ROUNDS, 0u32]).unwrap();
+    let pipeline = ComputePipeline::new(&gpu, &probe::PROGRAM, &[]).unwrap();
+    let run = device.frames().run(|rec| {
+        rec.dispatch(&pipeline, &probe::Bindings { rounds: &rounds }, &(), [1, 1, 1])?;
+        rec.make_visible_to_host(&rounds);
+        Ok(())
+    });
+    run.unwrap();
+    device.frames().state().forget();
+    let done = rounds.read::<u32>(4, 1)[0];
+    println!("{done} of {ROUNDS} rounds");
+    done == ROUNDS
+}
+
 #[test]
 fn a_thousand_segments_in_a_pixel_are_not_too_many() {
     let mut device = open(true);
+    if !loops_end_only_when_done(&mut device) {
+        println!("not proved here: the driver ends long loops early");
+        return;
+    }
     let mut random = Random(23);
     let particles: Vec<Particle> = (0..1500)
         .map(|_| {

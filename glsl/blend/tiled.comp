@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// Mode `tiled`: the exact integral along each pixel's ray, front to back, over the particles of its tile. One thread a
-// pixel; threads share nothing, so neither barriers nor a subgroup size matter.
+// Mode `tiled`: the exact integral along each pixel's ray, front to back, over the particles of its tile. One group a
+// tile that has any, one thread a pixel; threads share nothing, so neither barriers nor a subgroup size matter.
 //
 // Particles come in the order of their entry bounds, so everything before the bound of the next one is known. Segments
 // wait in a window; when it is full, all events up to that bound are integrated, which empties the places of segments
@@ -117,10 +117,12 @@ bool next_candidate(vec2 centre, float t_opaque, out TileParticle candidate) {
 
 void main() {
     uint lane = gl_LocalInvocationIndex;
-    uvec2 pixel = gl_WorkGroupID.xy * TILE + tile_pixel(lane);
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    if (group >= tiled_use.value.tiles) return;
+    uint tile = tile_list.tile[group];
+    uvec2 pixel = uvec2(tile % push.tiles.x, tile / push.tiles.x) * TILE + tile_pixel(lane);
     bool on_screen = pixel.x < frame.params.low_width && pixel.y < frame.params.low_height;
     vec2 centre = vec2(pixel) + 0.5;
-    uint tile = gl_WorkGroupID.y * push.tiles.x + gl_WorkGroupID.x;
     mask = 0u;
     cursor = tile_ranges.end[2u * tile];
     end = on_screen ? tile_ranges.end[2u * tile + 1u] : 0u;
@@ -139,7 +141,8 @@ void main() {
 
     TileParticle candidate;
     bool more = next_candidate(centre, t_opaque, candidate);
-    while (more) {
+    // The test stands at the end: where nothing branches, as in lavapipe, a last round for nobody would cost a full one.
+    if (more) do {
         Segment s = particle_segment(candidate.particle, centre);
         if (s.optical_depth > 0.0) {
             first = min(first, s.t_enter);
@@ -149,7 +152,7 @@ void main() {
             }
         }
         more = fits && next_candidate(centre, t_opaque, candidate);
-    }
+    } while (more);
     if (!on_screen) return;
     if (fits) {
         integrate_to(NEVER);

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Mode `tiled`: how many particles, then pairs, then unfinished half tiles there are, as indirect arguments. One thread.
+// Mode `tiled`: how many particles, pairs, tiles, and unfinished half tiles there are, as indirect arguments. One thread.
 #include "blend/tiled_use.glsl"
 #include "compact/groups.glsl"
 #include "grid/counters.glsl"
@@ -19,6 +19,7 @@ void main() {
         tiled_use.value.particles = particles;
         tiled_use.value.particle_groups = groups_for(particles, 64u);
         tiled_use.value.particle_sort = groups_for(particles, 1024u);
+        tiled_use.value.tiles = 0u;
         tiled_use.value.rest = 0u;
     } else if (push.stage == 1u) {
         counters.count.blend_nodes = max(counters.count.blend_nodes, pair_total.total);
@@ -26,6 +27,8 @@ void main() {
         tiled_use.value.pairs = pairs;
         tiled_use.value.pair_groups = groups_for(pairs, 64u);
         tiled_use.value.pair_sort = groups_for(pairs, 1024u);
+    } else if (push.stage == 2u) {
+        tiled_use.value.tile_groups = groups_for(tiled_use.value.tiles, 1u);
     } else {
         tiled_use.value.rest_groups = groups_for(tiled_use.value.rest, 1u);
     }

@@ -6,6 +6,7 @@ layout(binding = 13, std430) restrict buffer TiledUseBuffer { TiledUse value; } 
 layout(binding = 14, std430) restrict buffer Rest { uint word[]; } rest;   // per half tile: its unfinished pixels, then the list
 layout(binding = 15) restrict writeonly uniform image2D cloud;             // in-scattered radiance, transmittance
 layout(binding = 16) restrict writeonly uniform image2D nearest;           // distance to the first cloud [m]
+layout(binding = 17, std430) restrict readonly buffer TileList { uint tile[]; } tile_list;
 
 // What lies behind so much optical depth is left out: at most 1e-5 of its radiance would have come through.
 const float HIDDEN = 11.5;

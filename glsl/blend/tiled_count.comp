@@ -21,8 +21,9 @@ void main() {
     TileParticle t = tile_particle(frame.params, particles.elements[index], index, key_distance(keys.key[i]));
     tile_particles.element[i] = t;
     ivec4 range = tile_range(t, push.tiles);
-    uint count = 0u;
-    for (int y = range.y; y <= range.w; ++y)
+    bool everywhere = t.conic == vec3(0.0);
+    uint count = everywhere ? uint(push.tiles.x * push.tiles.y) : 0u;
+    if (!everywhere) for (int y = range.y; y <= range.w; ++y)
         for (int x = range.x; x <= range.z; ++x)
             if (touches(t, ivec2(x, y))) ++count;
     counts.count[i] = count;

@@ -4,7 +4,7 @@
 //! Keys → sort → silhouettes and tile counts → prefix sum → pairs of particle and tile → stable sort by tile → ranges →
 //! integral → the pixels that did not fit. The two lists, of particles and of pairs, grow between frames.
 
-use super::{BlendInputs, CloudTargets, NodeBudget, OPTICAL_DEPTH_SAMPLER, Shading};
+use super::{BlendInputs, CloudTargets, NO_CLOUD, NodeBudget, OPTICAL_DEPTH_SAMPLER, Shading};
 use crate::Result;
 use crate::compact::{Scan, Sort};
 use crate::gpu::{Buffer, ComputePipeline, Gpu, Recorder, Sampler};
@@ -93,6 +93,7 @@ pub(super) struct Tiled {
     in_use: Buffer,
     total: Buffer,
     ranges: Buffer,
+    tile_list: Buffer,
     rest: Buffer,
     tiles: [u32; 2],
 }
@@ -145,6 +146,7 @@ impl Tiled {
             in_use: Buffer::array::<[u8; layout::tiled_use::SIZE]>(gpu, "tiled use", 1)?,
             total: Buffer::array::<u32>(gpu, "pair total", 1)?,
             ranges: Buffer::array::<[u32; 2]>(gpu, "tile ranges", tile_count)?,
+            tile_list: Buffer::array::<u32>(gpu, "tile list", tile_count)?,
             rest: Buffer::array::<[u32; 4]>(gpu, "unfinished half tiles", tile_count)?,
             tiles,
         })
@@ -235,11 +237,18 @@ impl Tiled {
         pairs.sort.record_bits(rec, tile_bits, count, sort, &pairs.tiles, &pairs.particles)?;
 
         rec.fill_buffer(&self.ranges, 0, self.ranges.size(), 0);
-        let bindings = ranges::Bindings { tiled_use: in_use, pair_tiles: &pairs.tiles, tile_ranges: &self.ranges };
+        let bindings = ranges::Bindings {
+            tiled_use: in_use,
+            pair_tiles: &pairs.tiles,
+            tile_ranges: &self.ranges,
+            tile_list: &self.tile_list,
+        };
         rec.dispatch_indirect(&self.pipelines.ranges, &bindings, &(), in_use, offset::PAIR_GROUPS as u64)
     }
 
     fn record_integral(&self, rec: &mut Recorder<'_>, inputs: &BlendInputs<'_>, targets: &CloudTargets) -> Result<()> {
+        rec.clear_image(&targets.cloud, [0.0, 0.0, 0.0, 1.0]);
+        rec.clear_image(&targets.nearest, [NO_CLOUD; 4]);
         rec.fill_buffer(&self.rest, 0, self.rest.size(), 0);
         macro_rules! bindings {
             ($program:ident) => {
@@ -257,15 +266,17 @@ impl Tiled {
                     pair_particles: &self.pairs.particles,
                     tile_particles: &self.particles.elements,
                     tiled_use: &self.in_use,
+                    tile_list: &self.tile_list,
                     rest: &self.rest,
                     cloud: &targets.cloud,
                     nearest: &targets.nearest,
                 }
             };
         }
-        let threads = [self.tiles[0] * TILE * TILE, self.tiles[1], 1];
-        rec.dispatch(&self.pipelines.integrate, &bindings!(integrate), &self.tiles, threads)?;
         self.record_args(rec, inputs, 2, 0)?;
+        let offset = layout::tiled_use::TILE_GROUPS as u64;
+        rec.dispatch_indirect(&self.pipelines.integrate, &bindings!(integrate), &self.tiles, &self.in_use, offset)?;
+        self.record_args(rec, inputs, 3, 0)?;
         let offset = layout::tiled_use::REST_GROUPS as u64;
         rec.dispatch_indirect(&self.pipelines.rest, &bindings!(rest), &self.tiles, &self.in_use, offset)
     }
