@@ -238,9 +238,9 @@ pub struct BenchArgs {
     /// How overlapping particles are composited: auto, interlock[:K], attachment[:K], list, tiled, alpha; docs/blending.md compares them
     #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
     pub blend: Option<Blend>,
-    /// Compare with this mode in the same run, frame by frame in turns
-    #[arg(long, value_name = "MODE[:K]", value_parser = parse_blend)]
-    pub vs: Option<Blend>,
+    /// Compare with these modes in the same run, frame by frame in turns; all: with every mode that the device has
+    #[arg(long, value_name = "MODE[:K],...|all", value_delimiter = ',', value_parser = parse_versus)]
+    pub vs: Vec<Versus>,
     /// Frames measured per mode
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub measure: u32,
@@ -396,6 +396,17 @@ fn parse_noise(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A mode to compare with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Versus {
+    Mode(Blend),
+    All,
+}
+
+fn parse_versus(text: &str) -> Result<Versus, String> {
+    if text == "all" { Ok(Versus::All) } else { parse_blend(text).map(Versus::Mode) }
+}
+
 fn parse_blend(text: &str) -> Result<Blend, String> {
     text.parse().map_err(|error: welkin::Error| match error {
         welkin::Error::InvalidParam { expected, .. } => format!("expected {expected}"),
@@ -468,6 +479,24 @@ mod tests {
         assert_eq!((args.picture.quality, args.blend), (Some(QualityArg::Low), Some(Blend::Interlock(4))));
         assert_eq!(args.frames, Some(FrameRange(3..7)));
         assert_eq!((args.stats, args.picture.scene.set.len()), (Some("s.json".into()), 2));
+    }
+
+    #[test]
+    fn bench_takes_one_mode_several_or_all() {
+        let vs = |line: &str| -> Result<Vec<Versus>, String> {
+            let words = ["welkin", "bench", "a.toml"].into_iter().chain(line.split_whitespace());
+            match Cli::try_parse_from(words).map_err(|error| error.to_string())?.command {
+                Command::Bench(args) => Ok(args.vs),
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(vs(""), Ok(vec![]));
+        assert_eq!(vs("--vs interlock:4"), Ok(vec![Versus::Mode(Blend::Interlock(4))]));
+        let two = vec![Versus::Mode(Blend::Tiled), Versus::Mode(Blend::List)];
+        assert_eq!(vs("--vs tiled,list"), Ok(two.clone()));
+        assert_eq!(vs("--vs tiled --vs list"), Ok(two));
+        assert_eq!(vs("--vs all"), Ok(vec![Versus::All]));
+        assert!(vs("--vs glass").unwrap_err().contains("'glass' for '--vs"));
     }
 
     #[test]

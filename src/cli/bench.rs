@@ -1,13 +1,14 @@
-//! `welkin bench`: GPU time per pass, and a second mode measured in turns with the first so that both see the same machine.
+//! `welkin bench`: GPU time per pass, and other modes measured in turns with the first so that all see the same machine.
 
 use std::fmt::Write;
 
 use serde::Serialize;
 use welkin::output::{BlendStats, DeviceStats};
+use welkin::params::{BLENDS, Blend, Params};
 use welkin::{Error, Result};
 
-use super::args::BenchArgs;
-use super::progress::Progress;
+use super::args::{BenchArgs, Versus};
+use super::progress::{Progress, note};
 use super::scenes;
 use super::session::{Device, Session};
 use super::summary::{PassTimes, median, p95};
@@ -21,21 +22,31 @@ struct Report {
     warmup_frames: u32,
     measured_frames: u32,
     a: Side,
-    /// The mode of `--vs`.
+    /// The first mode of `--vs`.
     b: Option<Side>,
     ratio: Option<Ratio>,
+    /// All modes of `--vs`.
+    vs: Vec<Opponent>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, Clone)]
+struct Opponent {
+    #[serde(flatten)]
+    side: Side,
+    ratio: Ratio,
+}
+
+#[derive(Serialize, Clone)]
 struct Side {
     blend: BlendStats,
     /// Size of the tables that lit the last frame.
     tables: Option<String>,
     frame: Times,
+    compositing: Times,
     passes: Vec<Pass>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, Clone)]
 struct Pass {
     name: String,
     #[serde(flatten)]
@@ -43,70 +54,104 @@ struct Pass {
 }
 
 /// Over the measured frames [ms].
-#[derive(Serialize)]
+#[derive(Serialize, Clone, Copy)]
 struct Times {
     median_ms: f64,
     p95_ms: f64,
 }
 
 /// Medians of a divided by those of b.
-#[derive(Serialize)]
+#[derive(Serialize, Clone)]
 struct Ratio {
     frame: f64,
+    compositing: f64,
     /// Passes that both have.
     passes: Vec<PassRatio>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, Clone)]
 struct PassRatio {
     name: String,
     ratio: f64,
 }
 
+/// The passes of a frame that differ between modes.
+const COMPOSITING: &[&str] = &["bin", "blend", "resolve"];
+
 /// One mode under measurement.
 struct Contender {
     session: Session,
-    params: welkin::Params,
+    params: Params,
     totals: Vec<f64>,
+    compositing: Vec<f64>,
     passes: PassTimes,
 }
 
-pub fn run(args: &BenchArgs) -> Result<()> {
-    let params = scenes::load(&args.scene, &args.picture)?;
-    let mut modes = vec![scenes::blended(params.clone(), args.blend, "--blend")?];
-    if args.vs.is_some() {
-        modes.push(scenes::blended(params, args.vs, "--vs")?);
+impl Contender {
+    fn open(device: &mut Device, params: Params, args: &BenchArgs) -> Result<Self> {
+        let session = Session::open(device, &params, &args.picture)?;
+        Ok(Self { session, params, totals: Vec::new(), compositing: Vec::new(), passes: PassTimes::default() })
     }
-    let mut device = Device::open(&args.picture.scene, false)?;
-    let mut contenders = modes
-        .into_iter()
-        .map(|params| {
-            let session = Session::open(&mut device, &params, &args.picture)?;
-            Ok(Contender { session, params, totals: Vec::new(), passes: PassTimes::default() })
-        })
-        .collect::<Result<Vec<_>>>()?;
 
-    let mut progress = Progress::start("bench", u64::from(args.warmup) + u64::from(args.measure));
-    for frame in 0..args.warmup + args.measure {
-        for contender in &mut contenders {
-            let times = contender.session.time_frame(&mut device, &contender.params.at_frame(frame))?;
-            if frame < args.warmup {
-                continue;
-            }
+    fn measure(&mut self, device: &mut Device, frame: u32, counts: bool) -> Result<()> {
+        let times = self.session.time_frame(device, &self.params.at_frame(frame))?;
+        if counts {
             let total = times.gpu_ms.ok_or_else(|| Error::Unsupported {
                 needed: "measuring: timestamp queries".into(),
                 by: device.stats().name,
             })?;
-            contender.totals.push(total);
-            times.passes.iter().for_each(|pass| contender.passes.add(&pass.name, pass.gpu_ms));
+            self.totals.push(total);
+            let compositing = times.passes.iter().filter(|pass| COMPOSITING.contains(&pass.name.as_str()));
+            self.compositing.push(compositing.map(|pass| pass.gpu_ms).sum());
+            times.passes.iter().for_each(|pass| self.passes.add(&pass.name, pass.gpu_ms));
+        }
+        Ok(())
+    }
+
+    fn side(&self) -> Side {
+        let passes = self.passes.iter().map(|(name, values)| Pass { name: name.into(), times: times(values) });
+        Side {
+            blend: self.session.blend(),
+            tables: self.session.tables().map(|tables| tables.size),
+            frame: times(&self.totals),
+            compositing: times(&self.compositing),
+            passes: passes.collect(),
+        }
+    }
+}
+
+pub fn run(args: &BenchArgs) -> Result<()> {
+    let params = scenes::load(&args.scene, &args.picture)?;
+    let first = scenes::blended(params.clone(), args.blend, "--blend")?;
+    let named = args.vs.iter().filter_map(|versus| match versus {
+        Versus::Mode(blend) => Some(scenes::blended(params.clone(), Some(*blend), "--vs")),
+        Versus::All => None,
+    });
+    let mut others = named.collect::<Result<Vec<_>>>()?;
+    let mut device = Device::open(&args.picture.scene, false)?;
+    let mut contenders = vec![Contender::open(&mut device, first, args)?];
+    if args.vs.contains(&Versus::All) {
+        let mut taken: Vec<String> = others.iter().map(|params| params.quality.blend.to_string()).collect();
+        taken.push(contenders[0].session.blend().used);
+        let more = every_mode(&device, &params);
+        others.extend(more.into_iter().filter(|params| !taken.contains(&params.quality.blend.to_string())));
+    }
+    for params in others {
+        contenders.push(Contender::open(&mut device, params, args)?);
+    }
+
+    let mut progress = Progress::start("bench", u64::from(args.warmup) + u64::from(args.measure));
+    for frame in 0..args.warmup + args.measure {
+        for contender in &mut contenders {
+            contender.measure(&mut device, frame, frame >= args.warmup)?;
         }
         progress.set(u64::from(frame) + 1);
     }
     drop(progress);
 
-    let mut sides = contenders.iter().map(side);
-    let (a, b) = (sides.next(), sides.next());
-    let Some(a) = a else { return Ok(()) };
+    let mut sides = contenders.iter().map(Contender::side);
+    let Some(a) = sides.next() else { return Ok(()) };
+    let vs: Vec<_> = sides.map(|side| Opponent { ratio: ratio(&a, &side), side }).collect();
     let report = Report {
         scene: args.scene.display().to_string(),
         width: args.picture.size.width,
@@ -114,18 +159,38 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         device: device.stats(),
         warmup_frames: args.warmup,
         measured_frames: args.measure,
-        ratio: b.as_ref().map(|b| ratio(&a, b)),
         a,
-        b,
+        b: vs.first().map(|opponent| opponent.side.clone()),
+        ratio: vs.first().map(|opponent| opponent.ratio.clone()),
+        vs,
     };
     if args.json { super::print_json(&report) } else { super::print(&text(&report)) }
 }
 
-fn side(contender: &Contender) -> Side {
-    let times = |values: &[f64]| Times { median_ms: median(values).unwrap_or(0.0), p95_ms: p95(values).unwrap_or(0.0) };
-    let passes = contender.passes.iter().map(|(name, values)| Pass { name: name.into(), times: times(values) });
-    let tables = contender.session.tables().map(|tables| tables.size);
-    Side { blend: contender.session.blend(), tables, frame: times(&contender.totals), passes: passes.collect() }
+/// The scene in every mode that this version and the device have, windows included; others are named with the reason.
+fn every_mode(device: &Device, params: &Params) -> Vec<Params> {
+    let mut all = Vec::new();
+    for row in BLENDS.iter().filter(|row| row.here && row.value != Blend::Auto) {
+        let windows = match row.value {
+            Blend::Interlock(_) => [1, 2, 4, 8].map(Blend::Interlock).to_vec(),
+            Blend::Attachment(_) => [1, 2, 4, 8].map(Blend::Attachment).to_vec(),
+            other => vec![other],
+        };
+        for blend in windows {
+            let mut params = params.clone();
+            params.quality.blend = blend;
+            let answer = params.validate().map_err(|error| error.to_string()).and_then(|()| device.supports(blend));
+            match answer {
+                Ok(()) => all.push(params),
+                Err(reason) => note(&format!("without {blend}: {reason}")),
+            }
+        }
+    }
+    all
+}
+
+fn times(values: &[f64]) -> Times {
+    Times { median_ms: median(values).unwrap_or(0.0), p95_ms: p95(values).unwrap_or(0.0) }
 }
 
 fn ratio(a: &Side, b: &Side) -> Ratio {
@@ -134,27 +199,55 @@ fn ratio(a: &Side, b: &Side) -> Ratio {
         let ratio = pass.times.median_ms / other.times.median_ms;
         ratio.is_finite().then(|| PassRatio { name: pass.name.clone(), ratio })
     });
-    Ratio { frame: a.frame.median_ms / b.frame.median_ms, passes: passes.collect() }
+    Ratio {
+        frame: a.frame.median_ms / b.frame.median_ms,
+        compositing: a.compositing.median_ms / b.compositing.median_ms,
+        passes: passes.collect(),
+    }
 }
 
 fn text(report: &Report) -> String {
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    let _ = writeln!(text, "{} at {}x{} on {}", report.scene, report.width, report.height, report.device.name);
-    let _ = writeln!(text, "{} frames after {}; times in ms", report.measured_frames, report.warmup_frames);
-    for side in [Some(&report.a), report.b.as_ref()].into_iter().flatten() {
-        let _ = writeln!(text, "\n{:<16}{:>10}{:>10}", side.blend.used, "median", "p95");
-        for pass in &side.passes {
-            let _ = writeln!(text, "  {:<14}{:>10.3}{:>10.3}", pass.name, pass.times.median_ms, pass.times.p95_ms);
+    let sides: Vec<&Side> = std::iter::once(&report.a).chain(report.vs.iter().map(|opponent| &opponent.side)).collect();
+    let mut names: Vec<&str> = Vec::new();
+    for pass in sides.iter().flat_map(|side| &side.passes) {
+        if !names.contains(&pass.name.as_str()) {
+            names.push(&pass.name);
         }
-        let _ = writeln!(text, "  {:<14}{:>10.3}{:>10.3}", "frame", side.frame.median_ms, side.frame.p95_ms);
     }
-    if let (Some(ratio), Some(b)) = (&report.ratio, &report.b) {
-        let _ = writeln!(text, "\n{} / {}, medians", report.a.blend.used, b.blend.used);
-        for pass in &ratio.passes {
-            let _ = writeln!(text, "  {:<14}{:>10.3}", pass.name, pass.ratio);
-        }
-        let _ = writeln!(text, "  {:<14}{:>10.3}", "frame", ratio.frame);
+    let mut text = format!("{} at {}x{} on {}\n", report.scene, report.width, report.height, report.device.name);
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{} frames after {}, modes in turns\n", report.measured_frames, report.warmup_frames);
+    let mut row = |name: &str, cells: Vec<String>| {
+        let _ = write!(text, "{name:<16}");
+        cells.iter().for_each(|cell| {
+            let _ = write!(text, "{cell:>14}");
+        });
+        text.push('\n');
+    };
+    let ms = |value: f64| format!("{value:.3}");
+    row("median [ms]", sides.iter().map(|side| side.blend.used.clone()).collect());
+    for name in names {
+        let cell =
+            |side: &&Side| side.passes.iter().find(|pass| pass.name == name).map(|pass| ms(pass.times.median_ms));
+        row(&format!("  {name}"), sides.iter().map(|side| cell(side).unwrap_or_else(|| "-".into())).collect());
+    }
+    row("compositing", sides.iter().map(|side| ms(side.compositing.median_ms)).collect());
+    row("frame", sides.iter().map(|side| ms(side.frame.median_ms)).collect());
+    row("frame, p95", sides.iter().map(|side| ms(side.frame.p95_ms)).collect());
+    if !report.vs.is_empty() {
+        let ratios = |of: fn(&Ratio) -> f64| {
+            let others = report.vs.iter().map(|opponent| format!("{:.3}", of(&opponent.ratio)));
+            std::iter::once(String::new()).chain(others).collect()
+        };
+        row(
+            &format!("{} over", report.a.blend.used),
+            sides.iter().skip(1).fold(vec![String::new()], |mut cells, side| {
+                cells.push(side.blend.used.clone());
+                cells
+            }),
+        );
+        row("  compositing", ratios(|ratio| ratio.compositing));
+        row("  frame", ratios(|ratio| ratio.frame));
     }
     text
 }
@@ -173,6 +266,7 @@ mod tests {
             blend: BlendStats { requested: used.into(), used: used.into(), reason: "asked for".into() },
             tables: None,
             frame: times(1.0 + blend_ms),
+            compositing: times(blend_ms),
             passes: passes.into_iter().map(|(name, ms)| Pass { name: name.into(), times: times(ms) }).collect(),
         }
     }
@@ -180,7 +274,7 @@ mod tests {
     #[test]
     fn ratios_are_of_a_over_b() {
         let ratio = ratio(&side_of("interlock", 5.0), &side_of("alpha", 2.0));
-        assert_eq!(ratio.frame, 2.0);
+        assert_eq!((ratio.frame, ratio.compositing), (2.0, 2.5));
         let passes: Vec<_> = ratio.passes.iter().map(|pass| (pass.name.as_str(), pass.ratio)).collect();
         assert_eq!(passes, [("grid", 1.0), ("blend", 2.5)]);
     }
