@@ -22,8 +22,9 @@ Detail surface_detail(sampler3D tile, vec3 position, float radius, float footpri
     float first = floor(level), blend = level - first;
     float wavelength = pow(DETAIL_LACUNARITY, first + 1.0);
     Detail detail = Detail(0.0, vec3(0.0));
-    for (int octave = 0; octave <= DETAIL_OCTAVES; ++octave) {
-        // The longest fades in and the shortest out as the radius grows, and what pixels cannot show fades away.
+    // What pixels cannot show fades away, from the shortest up.
+    for (int octave = 0; octave <= DETAIL_OCTAVES && wavelength > 2.0 * footprint; ++octave) {
+        // The longest fades in and the shortest out as the radius grows.
         float weight = octave == 0 ? blend : octave == DETAIL_OCTAVES ? 1.0 - blend : 1.0;
         weight *= clamp(wavelength / (2.0 * footprint) - 1.0, 0.0, 1.0);
         if (weight > 0.0) {

@@ -25,7 +25,7 @@ struct Cell {
     uint  first;         // entry of the list
     uint  count;
     float majorant;      // sum of the extinctions listed [1/m]
-    uint  reserved;
+    float sunny;         // with which probability an event here is worth rays to the sun
 };
 
 struct CellEntry {
@@ -39,6 +39,15 @@ const uint GREATEST_SPLIT = 32u;
 int split_of(uint cells) { return int(round(pow(float(cells), 1.0 / 3.0))); }
 
 float greatest_extinction(Particle p, CellParams cells) { return cells.sigma_t * p.density * p.fade; }
+
+// Reciprocal of a direction with no infinities: a ray along a wall never meets it.
+vec3 inverse_of(vec3 dir) { return 1.0 / mix(dir, vec3(1e-12), lessThan(abs(dir), vec3(1e-12))); }
+
+// Distance from `origin` to where the ray leaves a cubic cell.
+float wall_ahead(vec3 origin, vec3 dir, vec3 corner, float edge) {
+    vec3 wall = (corner + mix(vec3(0.0), vec3(edge), greaterThan(dir, vec3(0.0))) - origin) * inverse_of(dir);
+    return min(wall.x, min(wall.y, wall.z));
+}
 
 // Half the sides of the box around an ellipsoid.
 vec3 ellipsoid_reach(Particle p) {

@@ -28,5 +28,5 @@ void main() {
         sum += greatest_extinction(particles.elements[entries.entry[i].particle], params.cells);
         entries.entry[i].sum = sum;
     }
-    cells.cell[index] = Cell(first, end - first, sum, 0u);
+    cells.cell[index] = Cell(first, end - first, sum, 1.0);
 }

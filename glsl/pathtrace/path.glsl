@@ -6,17 +6,21 @@
 const uint FLIGHT_NONE = 0u;    // between two samples
 const uint FLIGHT_CAMERA = 1u;  // from the eye, to the end of the scene, choosing the first event on the way
 const uint FLIGHT_FREE = 2u;    // from one event to the next
-const uint FLIGHT_SHADOW = 3u;  // from an event to the sun
+const uint FLIGHT_SUN = 3u;     // from an event to the sun
+const uint FLIGHT_SIDE = 4u;    // from an event towards where the next one would be well lit
+const uint FLIGHT_SIDE_SUN = 5u; // from there to the sun
 
 struct PathState {
     vec3  origin;        // of the ray, relative to the floating origin [m]
     float t;             // flown along it [m]
     vec3  dir;           // of the ray
     float t_end;         // where it leaves the scene [m]
-    vec3  way;           // in which the path came to the event at the origin
+    vec3  way;           // in which the path came to its last event
     float tau;           // left to the next tentative event, by the majorants [1]
-    float transmittance; // camera: of the way flown; shadow: of the way flown
-    float throughput;    // of the path up to the event at the origin
+    vec3  event;         // the path's last event, where it goes on when rays to the side have come home
+    float pending;       // what the sun's ray brings home if nothing is in its way [1/sr]
+    float transmittance; // of the way flown, camera and sun
+    float throughput;    // of the path up to its last event
     float scattered;     // camera: probability that the ray has had an event
     float t_event;       // camera: the event chosen [m]
     vec3  light;         // what this sample has brought home: skylight, or emission [W m⁻² sr⁻¹]
@@ -28,7 +32,8 @@ struct PathState {
     uint  sample_index;  // in this pass
     uint  draws;         // random draws of this sample so far
     uint  events;        // scattering events of this sample so far
-    uint  reserved;
+    float per_sunny;     // weight of this event's rays to the sun
+    uint  sun_draw;      // point of the sun's disc that rays of this event aim at, two 16-bit numbers
 };
 
 // Means over a pixel's samples, with what the compensated sum carries, and sums of squared deviations (Welford 1962).

@@ -47,7 +47,7 @@ layout(binding = 8, std430) restrict readonly buffer Air { AirParams params; } a
 layout(binding = 9, std430) restrict readonly buffer Light { SkyLight params; } sky_light;
 layout(binding = 10, std430) restrict buffer States { PathState state[]; } states;
 layout(binding = 11, std430) restrict buffer Sums { PixelSums sums[]; } pixels;
-layout(binding = 12, std430) restrict coherent buffer Activity { uint unfinished; } activity;
+layout(binding = 12, std430) restrict coherent buffer Activity { uint unfinished; uint steps; uint events; } activity;
 layout(binding = 13) uniform sampler3D detail_tile;
 layout(binding = 14) uniform sampler3D profile_volume;
 layout(binding = 15) uniform sampler2D sky_smooth;
@@ -65,22 +65,29 @@ layout(push_constant) uniform TracePush {
 // Below this transmittance a camera ray or a shadow ray is decided by chance, which is cheaper than carrying it on.
 const float FAINT = 0.05;
 
+// The same for all: read once, before any branch. (Lavapipe 26.1 faults where no lane of a subgroup is left to read them.)
+FrameParams view;
+CellParams cell_grid;
+PathParams medium;
+SkyLight lights;
+AirParams clear_air;
+
+#include "pathtrace/find.glsl"
+
 PathState s;
 uint pixel_index;
+uint events_met; // in this dispatch
 
-vec4 draw() { return unit_interval(pcg4d(uvec4(pixel_index, push.first_sample + s.sample_index, s.draws++, params.path.seed))); }
+vec4 draw() { return unit_interval(pcg4d(uvec4(pixel_index, push.first_sample + s.sample_index, s.draws++, medium.seed))); }
 
 bool sun_shines() {
-    return EMISSION == 0u && any(greaterThan(sky_light.params.sun_irradiance_clouds, vec3(0.0)));
+    return EMISSION == 0u && any(greaterThan(lights.sun_irradiance_clouds, vec3(0.0)));
 }
-
-// Reciprocal of a direction with no infinities: a ray along a wall never meets it.
-vec3 inverse_of(vec3 dir) { return 1.0 / mix(dir, vec3(1e-12), lessThan(abs(dir), vec3(1e-12))); }
 
 // From where to where the ray is in the grid; nothing if y <= x.
 vec2 stretch_in_grid(vec3 origin, vec3 dir) {
     vec3 inverse = inverse_of(dir);
-    vec3 a = (grid.params.least - origin) * inverse, b = (grid.params.greatest - origin) * inverse;
+    vec3 a = (cell_grid.least - origin) * inverse, b = (cell_grid.greatest - origin) * inverse;
     vec3 near = min(a, b), far = max(a, b);
     return vec2(max(max(near.x, near.y), max(near.z, 0.0)), min(min(far.x, far.y), far.z));
 }
@@ -96,29 +103,38 @@ void set_out(uint kind, vec3 origin, vec3 dir, float u) {
 
 vec3 sky_from(vec3 dir) {
     if (SKY == 0u) return vec3(0.0);
-    if (SKY == 1u) return params.path.uniform_sky;
-    float h = params.path.sky_altitude;
-    if (hits_ground(air.params, h, dir.y)) return sky_light.params.ground_irradiance_clouds / AIR_PI;
-    return sky_radiance(sky_smooth, sky_aerosol, air.params, h, dir, frame.params.to_sun);
+    if (SKY == 1u) return medium.uniform_sky;
+    float h = medium.sky_altitude;
+    if (hits_ground(clear_air, h, dir.y)) return lights.ground_irradiance_clouds / AIR_PI;
+    return sky_radiance(sky_smooth, sky_aerosol, clear_air, h, dir, view.to_sun);
+}
+
+float phase_single(float cosine) { return phase(cosine, medium.g_single, PHASE_FUNCTION); }
+float phase_multiple(float cosine) { return phase(cosine, medium.g_multiple, PHASE_FUNCTION); }
+
+// The point of the sun that this event's rays aim at.
+vec3 sun_drawn() {
+    if (medium.sun_versine <= 0.0) return view.to_sun;
+    vec2 u = (vec2(s.sun_draw & 0xffffu, s.sun_draw >> 16u) + 0.5) / 65536.0;
+    return turned(view.to_sun, u.x * medium.sun_versine, u.y);
 }
 
 // Sunlight of a path that leaves the scene along dir, where no rays are sent to the sun: part of the irradiance [1/sr].
 // The event that meets the sun has a phase function of its own, but the path was turned by that of all others.
 float sun_from(vec3 dir) {
-    if (ANALOGUE == 0u || 1.0 - dot(dir, frame.params.to_sun) > params.path.sun_versine) return 0.0;
-    float solid_angle = 6.283185307179586 * params.path.sun_versine;
-    return phase(s.cos_last, params.path.g_single, PHASE_FUNCTION)
-        / (phase(s.cos_last, params.path.g_multiple, PHASE_FUNCTION) * solid_angle);
+    if (ANALOGUE == 0u || 1.0 - dot(dir, view.to_sun) > medium.sun_versine) return 0.0;
+    float solid_angle = 6.283185307179586 * medium.sun_versine;
+    return phase_single(s.cos_last) / (phase_multiple(s.cos_last) * solid_angle);
 }
 
-void finish_sample() {
-    vec3 radiance = s.light + s.sunlight * sky_light.params.sun_irradiance_clouds;
-    PixelSums sums = pixels.sums[gl_GlobalInvocationID.x];
-    add_sample(sums, radiance, s.clear, s.distance, float(push.first_sample + s.sample_index + 1u));
-    pixels.sums[gl_GlobalInvocationID.x] = sums;
-    s.sample_index += 1u;
-    s.kind = FLIGHT_NONE;
-}
+// What happens when a ray has ended, in this order; each leads to a later one or to a new ray. Every piece of code stands
+// once: CPU drivers run all of it for any lane.
+const uint ACT_NONE = 0u;
+const uint ACT_EVENT = 1u;    // the path has had an event at s.event, which it reached along s.way
+const uint ACT_SIDE = 2u;     // from that event, a ray to the side
+const uint ACT_SCATTER = 3u;  // from that event, on
+const uint ACT_FINISH = 4u;   // the sample is complete
+uint act;
 
 void start_sample() {
     s.draws = 0u;
@@ -126,112 +142,114 @@ void start_sample() {
     s.light = vec3(0.0);
     s.sunlight = 0.0;
     s.transmittance = 1.0;
-    s.clear = 1.0;
     s.scattered = 0.0;
     s.distance = 0.0;
     s.t_event = 0.0;
-    uvec2 pixel = uvec2(pixel_index % frame.params.width, pixel_index / frame.params.width);
+    s.clear = 1.0;
+    uvec2 pixel = uvec2(pixel_index % view.width, pixel_index / view.width);
     vec4 u = draw();
     vec2 at = vec2(pixel) + (ANTIALIAS == 1u ? u.yz : vec2(0.5));
-    vec3 dir = view_ray(frame.params, at, vec2(frame.params.width, frame.params.height));
-    vec2 stretch = stretch_in_grid(frame.params.camera, dir);
-    stretch.y = min(stretch.y, texelFetch(opaque_distance, ivec2(pixel), 0).x);
-    if (stretch.y <= stretch.x) {
-        finish_sample();
-        return;
-    }
-    set_out(FLIGHT_CAMERA, frame.params.camera, dir, u.x);
+    vec3 dir = view_ray(view, at, vec2(view.width, view.height));
+    vec2 stretch = stretch_in_grid(view.camera, dir);
+    set_out(FLIGHT_CAMERA, view.camera, dir, u.x);
     s.t = stretch.x;
-    s.t_end = stretch.y;
+    s.t_end = min(stretch.y, texelFetch(opaque_distance, ivec2(pixel), 0).x);
 }
 
-// From the event at s.origin on into a direction drawn from the phase function.
-void scatter() {
-    float g = params.path.g_multiple;
+// The ray of kind s.kind has ended, having had an event or not (`hit`).
+void end_of_ray(bool hit) {
+    vec3 here = s.origin + s.t * s.dir;
+    if (s.kind == FLIGHT_CAMERA) {
+        s.clear = s.transmittance;
+        s.event = s.origin + s.t_event * s.dir;
+        s.way = s.dir;
+        s.throughput = s.scattered;
+        act = EMISSION == 1u || s.scattered <= 0.0 ? ACT_FINISH : ACT_EVENT;
+    } else if (s.kind == FLIGHT_FREE) {
+        s.event = here;
+        act = ACT_EVENT;
+        if (!hit) {
+            s.light += s.throughput * sky_from(s.dir);
+            s.sunlight += s.throughput * sun_from(s.dir);
+            act = ACT_FINISH;
+        }
+    } else if (s.kind == FLIGHT_SIDE && hit) {
+        s.transmittance = 1.0;
+        set_out(FLIGHT_SIDE_SUN, here, sun_drawn(), draw().x);
+        act = ACT_NONE;
+    } else {
+        if (s.kind != FLIGHT_SIDE) s.sunlight += s.pending * s.transmittance;
+        act = s.kind == FLIGHT_SUN ? ACT_SIDE : ACT_SCATTER;
+    }
+}
+
+// Absorption, and whether rays go to the sun: straight to it, or to the side first.
+void meet_event() {
+    s.events += 1u;
+    events_met += 1u;
     vec4 u = draw();
+    act = ACT_SCATTER;
+    if (ANALOGUE == 1u) {
+        if (u.x >= medium.albedo) act = ACT_FINISH;
+        return;
+    }
+    s.throughput *= medium.albedo;
+    if (s.throughput < 0.1 * s.scattered) s.throughput = u.x < 0.5 ? 2.0 * s.throughput : 0.0;
+    if (s.throughput <= 0.0) {
+        act = ACT_FINISH;
+        return;
+    }
+    vec3 corner;
+    float edge, sunny = find_cell(s.event, corner, edge).sunny;
+    if (!sun_shines() || u.y >= sunny) return;
+    s.per_sunny = 1.0 / sunny;
+    s.sun_draw = uint(u.z * 65536.0) | (uint(u.w * 65536.0) << 16u);
+    vec3 to_sun = sun_drawn();
+    float q = phase_single(dot(to_sun, s.way));
+    s.pending = s.throughput * s.per_sunny * q;
+    if (s.events > 1u) {
+        float p = phase_multiple(s.cos_last);
+        s.pending *= p / (p + q);
+    }
+    s.transmittance = 1.0;
+    set_out(FLIGHT_SUN, s.event, to_sun, draw().x);
+    act = ACT_NONE;
+}
+
+// A new direction: on from the path's event by the phase function, or to the side. The event after this one meets the sun
+// with a phase function that peaks: its direction is drawn from that peak too, and both ways of drawing share the light by
+// the balance heuristic (Veach and Guibas 1995). With p for the turn at this event and q for the one towards the sun at the
+// next, either then brings p q / (p + q) home, which no peak of one alone can make large.
+void leave_event() {
+    vec4 u = draw();
+    bool side = act == ACT_SIDE;
+    float g = side ? medium.g_single : medium.g_multiple;
     float cosine = sample_henyey_greenstein(g, u.x);
     if (PHASE_FUNCTION == PHASE_CORNETTE_SHANKS) {
-        // Cornette-Shanks is Henyey-Greenstein accepted with probability (1 + cos²) / 2: two draws in three at least.
+        // Cornette-Shanks is Henyey-Greenstein accepted with probability (1 + cos²) / 2: one draw in two at least.
         for (int i = 0; i < 64 && u.y >= 0.5 * (1.0 + cosine * cosine); ++i) {
             u = draw();
             cosine = sample_henyey_greenstein(g, u.x);
         }
     }
-    s.cos_last = cosine;
-    s.way = turned(s.way, 1.0 - cosine, u.z);
-    set_out(FLIGHT_FREE, s.origin, s.way, u.w);
-}
-
-// The path has had an event at s.origin, which it reached along s.way.
-void meet_event() {
-    s.events += 1u;
-    float albedo = params.path.albedo;
-    if (ANALOGUE == 1u || albedo < 1.0) {
-        vec4 u = draw();
-        if (ANALOGUE == 1u) {
-            if (u.x >= albedo) s.throughput = 0.0;
-        } else {
-            s.throughput *= albedo;
-            if (s.throughput < 0.1 * s.scattered) s.throughput = u.x < 0.5 ? 2.0 * s.throughput : 0.0;
-        }
-        if (s.throughput <= 0.0) {
-            finish_sample();
-            return;
-        }
-    }
-    if (ANALOGUE == 1u || !sun_shines()) {
-        scatter();
-        return;
-    }
-    vec4 u = draw();
-    vec3 to_sun = frame.params.to_sun;
-    if (params.path.sun_versine > 0.0) to_sun = turned(to_sun, u.x * params.path.sun_versine, u.y);
-    s.transmittance = 1.0;
-    set_out(FLIGHT_SHADOW, s.origin, to_sun, u.z);
-}
-
-void end_of_ray() {
-    if (s.kind == FLIGHT_CAMERA) {
-        s.clear = s.transmittance;
-        if (EMISSION == 1u || s.scattered <= 0.0) {
-            finish_sample();
-            return;
-        }
-        s.origin += s.t_event * s.dir;
-        s.way = s.dir;
-        s.throughput = s.scattered;
-        meet_event();
-    } else if (s.kind == FLIGHT_SHADOW) {
-        s.sunlight += s.throughput * s.transmittance * phase(dot(s.dir, s.way), params.path.g_single, PHASE_FUNCTION);
-        scatter();
+    vec3 dir = turned(side ? sun_drawn() : s.way, 1.0 - cosine, u.z);
+    if (side) {
+        float q = phase_single(cosine), p = phase_multiple(dot(s.way, dir));
+        s.pending = s.throughput * s.per_sunny * medium.albedo * p * q / (p + q);
     } else {
-        s.light += s.throughput * sky_from(s.dir);
-        s.sunlight += s.throughput * sun_from(s.dir);
-        finish_sample();
+        s.cos_last = cosine;
+        s.way = dir;
     }
+    set_out(side ? FLIGHT_SIDE : FLIGHT_FREE, s.event, dir, u.w);
 }
 
-// A tentative event of particle p that is real with this probability.
-void tentative(Particle p, float real, vec2 u) {
-    if (s.kind == FLIGHT_FREE) {
-        if (u.x < real) {
-            s.origin += s.t * s.dir;
-            meet_event();
-        }
-        return;
-    }
-    bool faint = ANALOGUE == 1u || s.transmittance < FAINT;
-    if (faint) real = u.x < real ? 1.0 : 0.0;
-    float here = s.transmittance * real;
-    s.transmittance -= here;
-    if (s.kind == FLIGHT_CAMERA) {
-        // One event is kept of all, each with its own probability; the rest is what gets through.
-        s.distance += here * s.t;
-        s.scattered += here;
-        if (EMISSION == 1u) s.light += here * p.colour;
-        if (here > 0.0 && u.y * s.scattered < here) s.t_event = s.t;
-    }
-    if (s.transmittance <= 0.0) end_of_ray();
+void finish_sample() {
+    vec3 radiance = s.light + s.sunlight * lights.sun_irradiance_clouds;
+    PixelSums sums = pixels.sums[gl_GlobalInvocationID.x];
+    add_sample(sums, radiance, s.clear, s.distance, float(push.first_sample + s.sample_index + 1u));
+    pixels.sums[gl_GlobalInvocationID.x] = sums;
+    s.sample_index += 1u;
+    s.kind = FLIGHT_NONE;
 }
 
 float profile_at(Particle p, vec3 x) {
@@ -241,38 +259,28 @@ float profile_at(Particle p, vec3 x) {
     if (HOMOGENEOUS == 1u) return 1.0;
     vec3 n = r2 > 1e-12 ? p_us * inversesqrt(r2) : vec3(0.0, 1.0, 0.0);
     // The finest thing that the renderer shows there at full resolution.
-    float far = distance(p.centre + rotate(p.rotation, n * p.semi_axes), frame.params.camera);
-    float footprint = max(far * 2.0 * frame.params.tan_half_fov_y / float(frame.params.height), 1e-3);
-    float radius = displaced_radius(p, n, frame.params.origin, detail_tile, params.path.detail, footprint);
+    float far = distance(p.centre + rotate(p.rotation, n * p.semi_axes), view.camera);
+    float footprint = max(far * 2.0 * view.tan_half_fov_y / float(view.height), 1e-3);
+    float radius = displaced_radius(p, n, view.origin, detail_tile, medium.detail, footprint);
     return r2 < radius * radius ? textureLod(profile_volume, p_us * (0.5 / radius) + 0.5, 0.0).x : 0.0;
 }
 
-void step_ray() {
-    CellParams g = grid.params;
-    vec3 x = s.origin + s.t * s.dir;
-    ivec3 tops = ivec3(g.top_x, g.top_y, g.top_z);
-    ivec3 top = cell_at(x - g.least, g.top_edge, tops);
-    uint top_index = uint((top.z * tops.y + top.y) * tops.x + top.x);
-    vec3 corner = g.least + vec3(top) * g.top_edge;
-    float edge = g.top_edge;
-    int n = split_of(cell_counts.count[top_index]);
-    Cell cell = Cell(0u, 0u, 0.0, 0u);
-    if (n > 0) {
-        edge = g.top_edge / float(n);
-        ivec3 sub = cell_at(x - corner, edge, ivec3(n));
-        corner += vec3(sub) * edge;
-        cell = cells.cell[cell_first.first[top_index] + uint((sub.z * n + sub.y) * n + sub.x)];
-    }
-    vec3 wall = (corner + mix(vec3(0.0), vec3(edge), greaterThan(s.dir, vec3(0.0))) - s.origin) * inverse_of(s.dir);
+// One stretch of the ray; whether it has ended.
+bool step_ray(out bool hit) {
+    hit = false;
+    vec3 corner;
+    float edge;
+    Cell cell = find_cell(s.origin + s.t * s.dir, corner, edge);
     // A little beyond the wall, where the lists of both cells hold, so that rounding cannot keep a ray in its cell.
-    float t_wall = min(max(min(wall.x, min(wall.y, wall.z)), s.t) + 0.25 * g.slack, s.t_end);
+    float t_wall = min(max(wall_ahead(s.origin, s.dir, corner, edge), s.t) + 0.25 * cell_grid.slack, s.t_end);
     float tau_wall = cell.majorant * (t_wall - s.t);
+    if (s.t >= s.t_end) return true; // a ray that misses the scene
     if (s.tau > tau_wall) {
         s.tau -= tau_wall;
         s.t = t_wall;
-        if (s.t >= s.t_end) end_of_ray();
-        return;
+        return s.t >= s.t_end;
     }
+    // A tentative event.
     s.t += s.tau / cell.majorant;
     vec4 u = draw();
     s.tau = exponential(u.z);
@@ -280,23 +288,58 @@ void step_ray() {
     uint i = 0u;
     while (i + 1u < cell.count && entries.entry[cell.first + i].sum <= chosen) ++i;
     Particle p = particles.elements[entries.entry[cell.first + i].particle];
-    tentative(p, profile_at(p, s.origin + s.t * s.dir), u.xy);
+    float real = profile_at(p, s.origin + s.t * s.dir);
+    if (s.kind == FLIGHT_FREE || s.kind == FLIGHT_SIDE) {
+        hit = u.x < real;
+        return hit;
+    }
+    if (ANALOGUE == 1u || s.transmittance < FAINT) real = u.x < real ? 1.0 : 0.0;
+    float here = s.transmittance * real;
+    s.transmittance -= here;
+    if (s.kind == FLIGHT_CAMERA) {
+        // One event is kept of all, each with its own probability; the rest is what gets through.
+        s.distance += here * s.t;
+        s.scattered += here;
+        if (EMISSION == 1u) s.light += here * p.colour;
+        if (here > 0.0 && u.y * s.scattered < here) s.t_event = s.t;
+    }
+    return s.transmittance <= 0.0;
 }
 
+// Steps between two looks at what has ended: rays of a subgroup end at different times.
+const int STRIDE = 4;
+
 void main() {
+    view = frame.params;
+    cell_grid = grid.params;
+    medium = params.path;
+    lights = sky_light.params;
+    if (SKY == 2u) clear_air = air.params;
     uint index = gl_GlobalInvocationID.x;
     if (index >= push.pixel_count) return;
     s = states.state[index];
     if (s.kind == FLIGHT_NONE && s.sample_index >= push.samples) return;
     pixel_index = push.first_pixel + index;
-    for (uint i = 0u; i < push.steps; ++i) {
+    uint taken = 0u;
+    events_met = 0u;
+    for (uint turn = 0u; turn < push.steps; ++turn) {
         if (s.kind == FLIGHT_NONE) {
             if (s.sample_index >= push.samples) break;
             start_sample();
-        } else {
-            step_ray();
         }
+        taken += uint(STRIDE);
+        bool ended = false, hit = false;
+        for (int i = 0; i < STRIDE; ++i) {
+            if (!ended) ended = step_ray(hit);
+        }
+        act = ACT_NONE;
+        if (ended) end_of_ray(hit);
+        if (act == ACT_EVENT) meet_event();
+        if (act == ACT_SIDE || act == ACT_SCATTER) leave_event();
+        if (act == ACT_FINISH) finish_sample();
     }
     states.state[index] = s;
     if (s.kind != FLIGHT_NONE || s.sample_index < push.samples) atomicAdd(activity.unfinished, 1u);
+    atomicAdd(activity.steps, taken);
+    atomicAdd(activity.events, events_met);
 }

@@ -48,13 +48,15 @@ pub fn run(args: &ReferenceArgs) -> Result<()> {
     let seconds = started.elapsed().as_secs_f64();
     let paths = f64::from(tracer.samples() - first) * f64::from(size.width) * f64::from(size.height);
     note(&format!(
-        "wrote {} ({}x{}, {} samples a pixel, relative noise {:.4}, {:.0} paths/s)",
+        "wrote {} ({}x{}, {} samples a pixel, relative noise {:.4}, {:.0} paths/s, {:.0} events and {:.0} steps a path)",
         args.output.display(),
         size.width,
         size.height,
         tracer.samples(),
         tracer.noise(),
         paths / seconds.max(1e-9),
+        tracer.work().events as f64 / paths.max(1.0),
+        tracer.work().steps as f64 / paths.max(1.0),
     ));
     Ok(())
 }

@@ -9,12 +9,13 @@ use crate::compact::Scan;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Frames, Gpu};
 use crate::shaders::{
     pathtrace_bounds_comp as bounds, pathtrace_count_comp as count, pathtrace_fill_comp as fill,
-    pathtrace_order_comp as order, pathtrace_split_comp as split, pathtrace_top_comp as top,
+    pathtrace_order_comp as order, pathtrace_split_comp as split, pathtrace_sunny_comp as sunny,
+    pathtrace_top_comp as top,
 };
 use crate::shared::assert_layout;
 
-/// Top cells at most, and at least if there are particles enough.
-const TOP_CELLS: [f64; 2] = [64.0, 65_536.0];
+/// Top cells wanted at least and at most. Twice as many may come of it: a group of a dispatch each.
+const TOP_CELLS: [f64; 2] = [64.0, 30_000.0];
 /// Cells at most: 16 bytes each, and a dispatch of 64 to a group.
 const MOST_CELLS: u32 = 4_000_000;
 /// Entries of all lists at most: 8 bytes each.
@@ -70,11 +71,11 @@ fn unordered(bits: u32) -> f32 {
 }
 
 impl CellGrid {
-    /// Builds the grid over the first `particles` of a list. Waits for the device a few times; afterwards the lists that
+    /// Builds the grid over the first `particles` of a list, for a sun in direction `to_sun`. Waits for the device a few times; afterwards the lists that
     /// it needed only for itself are gone, so the caller has to let [`RecorderState::forget`] follow.
     ///
     /// [`RecorderState::forget`]: crate::gpu::RecorderState::forget
-    pub fn build(frames: &mut Frames, list: &Buffer, particles: u32, sigma_t: f32) -> Result<Self> {
+    pub fn build(frames: &mut Frames, list: &Buffer, particles: u32, sigma_t: f32, to_sun: [f32; 3]) -> Result<Self> {
         let gpu = &frames.gpu().clone();
         let mut params = geometry(find_bounds(frames, list, particles)?, particles, sigma_t);
         let top_cells: u32 = params.top.iter().product();
@@ -88,7 +89,7 @@ impl CellGrid {
         let top_scan = Scan::new(gpu, top_cells)?;
         let (top_pipeline, split_pipeline) = (pipeline(gpu, &top::PROGRAM)?, pipeline(gpu, &split::PROGRAM)?);
         let (count_pipeline, fill_pipeline) = (pipeline(gpu, &count::PROGRAM)?, pipeline(gpu, &fill::PROGRAM)?);
-        let order_pipeline = pipeline(gpu, &order::PROGRAM)?;
+        let (order_pipeline, sunny_pipeline) = (pipeline(gpu, &order::PROGRAM)?, pipeline(gpu, &sunny::PROGRAM)?);
         loop {
             let params_buffer = Buffer::upload(gpu, "cell params", &[params])?;
             frames.run(|rec| {
@@ -161,7 +162,15 @@ impl CellGrid {
                         entries: &list_entries,
                         cells: &cell_list,
                     };
-                    rec.dispatch(&order_pipeline, &bindings, &[cells, entries], [cells, 1, 1])
+                    rec.dispatch(&order_pipeline, &bindings, &[cells, entries], [cells, 1, 1])?;
+                    let bindings = sunny::Bindings {
+                        grid: &params_buffer,
+                        cell_counts: &cell_counts,
+                        cell_first: &cell_first,
+                        cells: &cell_list,
+                    };
+                    let push = [to_sun[0], to_sun[1], to_sun[2], 0.0];
+                    rec.dispatch(&sunny_pipeline, &bindings, &push, [64 * top_cells, 1, 1])
                 })
             })?;
             return Ok(Self {
@@ -253,7 +262,7 @@ mod tests {
                 assert!(last <= 1.01 * f64::from(params.top_edge) + 1.0, "{params:?}");
             }
             let cells: u32 = params.top.iter().product();
-            assert!((60..=2 * 65_536).contains(&cells), "{params:?}");
+            assert!((60..=2 * 30_000).contains(&cells), "{params:?}");
         }
     }
 

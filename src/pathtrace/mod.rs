@@ -28,4 +28,4 @@ mod tracer;
 pub use cells::{CellCounts, CellGrid, CellParams};
 pub use picture::Truth;
 pub use state::{PixelSums, State};
-pub use tracer::{Environment, Estimator, PathOptions, PathTracer, Progress, SunShape};
+pub use tracer::{Environment, Estimator, PathOptions, PathTracer, Progress, SunShape, Work};

@@ -18,8 +18,10 @@ use crate::shaders::{lut_profile_comp as profile, pathtrace_trace_comp as trace}
 use crate::shared::{FrameParams, assert_layout};
 use crate::{Error, Result};
 
-/// Pixels that are traced together: 112 bytes of state and 64 of sums each.
+/// Pixels that are traced together: 128 bytes of state and 64 of sums each.
 const TILE: usize = 1 << 18;
+/// Size of `PathState` of `glsl/pathtrace/path.glsl`.
+const STATE_WORDS: usize = crate::shared::layout::path_state::SIZE / 4;
 /// Time that a dispatch is to take [s]: drivers reset a device that has not answered for about two seconds.
 const DISPATCH_SECONDS: f64 = 0.2;
 /// Steps of the first dispatch.
@@ -89,6 +91,15 @@ pub struct Progress {
     pub pass_samples: u32,
 }
 
+/// What a tracer has done since it was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Stretches of rays, each in one cell up to a wall or a tentative event.
+    pub steps: u64,
+    /// Scattering events.
+    pub events: u64,
+}
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct PathParams {
@@ -130,6 +141,7 @@ pub struct PathTracer {
     pub(super) fill: f32,
     pub(super) samples: u32,
     pub(super) pixels: Vec<PixelSums>,
+    options: PathOptions,
     fingerprint: [u8; 32],
     grid: CellGrid,
     pipeline: ComputePipeline,
@@ -145,6 +157,7 @@ pub struct PathTracer {
     read_activity: Buffer,
     steps: u32,
     pass_samples: u32,
+    work: Work,
 }
 
 impl PathTracer {
@@ -174,7 +187,8 @@ impl PathTracer {
         let fill = central_fill(params.clouds.style, PROFILE_SEED);
         let mut renderer = Renderer::new(gpu, &params, extent, frames.slots())?;
         let particles = record_until_it_fits(frames, &mut renderer, &params, fill)?;
-        let grid = CellGrid::build(frames, renderer.parts().set.particles(), particles, params.clouds.sigma_t)?;
+        let (sigma_t, to_sun) = (params.clouds.sigma_t, params.sun.to_sun().map(|c| c as f32));
+        let grid = CellGrid::build(frames, renderer.parts().set.particles(), particles, sigma_t, to_sun)?;
 
         let origin = floating_origin(params.camera.position);
         let frame = renderer.frame_params(&params.camera, origin, fill);
@@ -215,18 +229,20 @@ impl PathTracer {
         frames.state().forget(); // what the grid's construction used is gone
         Ok(Self {
             fingerprint: fingerprint(&params, extent, options),
+            options: *options,
             path: Buffer::upload(gpu, "path params", &[path])?,
             frame: Buffer::upload(gpu, "path frame params", &[frame])?,
-            states: Buffer::array::<[u32; 28]>(gpu, "path states", tile)?,
+            states: Buffer::array::<[u32; STATE_WORDS]>(gpu, "path states", tile)?,
             sums: Buffer::array::<PixelSums>(gpu, "pixel sums", tile)?,
             upload: Buffer::new(gpu, "pixel sums upload", sums_bytes, BufferKind::Upload)?,
             readback: Buffer::new(gpu, "pixel sums readback", sums_bytes, BufferKind::Readback)?,
-            activity: Buffer::array::<u32>(gpu, "path activity", 1)?,
-            read_activity: Buffer::new(gpu, "path activity readback", 4, BufferKind::Readback)?,
+            activity: Buffer::array::<[u32; 3]>(gpu, "path activity", 1)?,
+            read_activity: Buffer::new(gpu, "path activity readback", 12, BufferKind::Readback)?,
             pixels: vec![PixelSums::default(); count],
             samples: 0,
             steps: FIRST_STEPS,
             pass_samples: 1,
+            work: Work::default(),
             params,
             extent,
             renderer,
@@ -248,6 +264,21 @@ impl PathTracer {
     #[must_use]
     pub fn cells(&self) -> CellCounts {
         self.grid.counts()
+    }
+
+    /// What it took so far.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Starts again with another seed.
+    pub fn reseed(&mut self, seed: u32) {
+        self.options.seed = seed;
+        self.fingerprint = fingerprint(&self.params, self.extent, &self.options);
+        self.path.write(std::mem::offset_of!(PathParams, seed) as u64, &[seed]);
+        self.samples = 0;
+        self.pixels.fill(PixelSums::default());
     }
 
     /// What has been gathered, to be kept.
@@ -348,7 +379,10 @@ impl PathTracer {
             };
             self.dispatch(frames, &push)?;
             let seconds = started.elapsed().as_secs_f64();
-            let unfinished = self.read_activity.read::<u32>(0, 1)[0];
+            let activity = self.read_activity.read::<u32>(0, 3);
+            let unfinished = activity[0];
+            self.work.steps += u64::from(activity[1]);
+            self.work.events += u64::from(activity[2]);
             // Towards the time that a dispatch may take, by at most a factor of 2 since its load can rise as fast.
             let factor = (DISPATCH_SECONDS / seconds.max(1e-6)).clamp(0.25, 2.0);
             steps = ((f64::from(steps) * factor) as u32).clamp(1, 1 << 20);
@@ -395,9 +429,9 @@ impl PathTracer {
         };
         frames.run(|rec| {
             rec.pass("paths", |rec| {
-                rec.fill_buffer(&self.activity, 0, 4, 0);
+                rec.fill_buffer(&self.activity, 0, 12, 0);
                 rec.dispatch(&self.pipeline, &bindings, push, [push.pixel_count, 1, 1])?;
-                rec.copy_buffer(&self.activity, &self.read_activity, 4);
+                rec.copy_buffer(&self.activity, &self.read_activity, 12);
                 rec.make_visible_to_host(&self.read_activity);
                 Ok(())
             })
