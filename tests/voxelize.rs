@@ -210,7 +210,7 @@ fn leaves() -> Vec<([u32; 3], Vec<f32>)> {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
         state
     };
-    let value = |word: u32| if word % 3 == 0 { 0.0 } else { f32::from_bits(word & 0x007f_ffff | 0x3d00_0000) };
+    let value = |word: u32| if word.is_multiple_of(3) { 0.0 } else { f32::from_bits(word & 0x007f_ffff | 0x3d00_0000) };
     places.map(|at| (at, (0..512).map(|_| value(word())).collect())).to_vec()
 }
 

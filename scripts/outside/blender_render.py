@@ -24,6 +24,7 @@ turn = Matrix.Rotation(math.radians(90.0), 4, "X")  # from +y up to +z up: (x, y
 
 volume = bpy.data.volumes.new("cloud")
 volume.filepath = os.path.abspath(cloud)
+volume.render.precision = "FULL"  # 32-bit floats; half by default
 body = bpy.data.objects.new("cloud", volume)
 body.matrix_world = turn
 scene.collection.objects.link(body)

@@ -68,7 +68,7 @@ struct CameraSide {
 /// The two kinds of file.
 enum Volume {
     Npy(NpyVolume),
-    Vdb(VdbWriter),
+    Vdb(Box<VdbWriter>),
 }
 
 /// Sums over all voxels.
@@ -91,7 +91,7 @@ pub fn run(args: &VoxelizeArgs) -> Result<()> {
     let mut voxelizer = Voxelizer::new(&gpu, &params, gathered, args.samples)?;
 
     let (mut volume, order) = if vdb {
-        (Volume::Vdb(VdbWriter::create(&args.output)?), Order::Tree)
+        (Volume::Vdb(Box::new(VdbWriter::create(&args.output)?)), Order::Tree)
     } else {
         (Volume::Npy(NpyVolume::create(&args.output, grid.size)?), Order::Layers)
     };
