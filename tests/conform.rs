@@ -2,7 +2,7 @@
 mod support;
 
 use support::{stderr, stdout, welkin};
-use welkin::conform::{self, Effort, Lab, LabOptions, Sabotage, Verdict};
+use welkin::conform::{self, Effort, Group, Lab, LabOptions, Sabotage, Verdict};
 
 #[test]
 fn the_driver_does_what_welkin_needs() {
@@ -47,4 +47,71 @@ fn every_check_can_fail() {
         }
     }
     assert!(tried > 50, "{tried}");
+}
+
+/// What `welkin conform` with `words` prints, and its exit status.
+fn run(words: &[&str]) -> (String, String, i32) {
+    let output = welkin().arg("conform").args(words).output().unwrap();
+    (stdout(&output), stderr(&output), output.status.code().unwrap())
+}
+
+#[test]
+fn the_matrix_can_be_listed_and_filtered() {
+    let (text, _, status) = run(&["--list", "--json", "--filter", "attachment.*.merge", "--filter", "static.*"]);
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
+    assert_eq!(status, 0);
+    for row in &rows {
+        let id = row["id"].as_str().unwrap();
+        assert!(id.starts_with("static.") || id.ends_with(".merge"), "{id}");
+        assert!(
+            ["what", "why", "spec"].iter().all(|key| row[key].as_str().is_some_and(|text| text.len() > 5)),
+            "{row}"
+        );
+    }
+    assert!(rows.len() >= 4, "{rows:?}");
+    let (_, message, status) = run(&["--filter", "nothing*"]);
+    assert!(status == 2 && message.contains("--filter = nothing*: expected a pattern"), "{message}");
+    let (_, message, status) = run(&["--device", "voodoo", "--filter", "static.*"]);
+    assert!(status == 2 && message.contains("--device = voodoo: expected part of the name"), "{message}");
+}
+
+#[test]
+fn a_check_that_takes_too_long_fails_with_status_1() {
+    // A thousand frames: seconds on a CPU, less than the limit on fast hardware.
+    let words = ["--json", "--timeout", "1", "--filter", "attachment.subpass.determinism", "--filter", "static.*"];
+    let (text, _, status) = run(&words);
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let device = &report["devices"][0];
+    assert_eq!(status, i32::from(device["failed"].as_u64().unwrap() > 0), "{text}");
+    if device["device"]["kind"] == "cpu" {
+        let rows = device["rows"].as_array().unwrap();
+        let slow = rows.iter().find(|row| row["id"] == "attachment.subpass.determinism").unwrap();
+        assert_eq!((&slow["result"], &slow["found"]), (&"fail".into(), &"nothing for 1 s".into()));
+        assert!(rows.iter().any(|row| row["result"] == "pass"), "{text}");
+    }
+}
+
+/// Interlock and flags are taken away, and nobody looks: `cargo test --release --test conform -- --ignored` on hardware.
+#[test]
+#[ignore = "a software rasterizer keeps a pixel's fragments in order even where nobody asks for it"]
+fn hardware_shows_what_is_not_ordered() {
+    let sabotage = Some(Sabotage::UnorderedUnseen);
+    let mut lab = Lab::open(LabOptions { device: None, effort: Effort::Full, sabotage }).unwrap();
+    for group in [Group::Interlock, Group::Attachment] {
+        let (mut failed, mut tried) = (0, 0);
+        for check in conform::checks() {
+            if check.group == group && check.fails_by.contains(&Sabotage::Unordered) {
+                match check.run(&mut lab).verdict {
+                    Verdict::Fail { expected, found } => {
+                        println!("{}: expected {expected}; found {found}", check.id);
+                        (failed, tried) = (failed + 1, tried + 1);
+                    }
+                    Verdict::Pass(_) => tried += 1,
+                    Verdict::Skip(_) => {}
+                }
+            }
+        }
+        println!("{}: {failed} of {tried} checks show it", group.name());
+        assert!(tried == 0 || failed > 0, "{}: none of {tried} checks shows that nothing is ordered", group.name());
+    }
 }
