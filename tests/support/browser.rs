@@ -73,11 +73,9 @@ impl Browser {
                 assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
                 return answer["result"].take();
             }
-            match answer["method"].as_str() {
-                Some("Runtime.exceptionThrown" | "Runtime.consoleAPICalled" | "Log.entryAdded") => {
-                    self.complaints.push(answer["params"].to_string());
-                }
-                _ => {}
+            let told = ["Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded"];
+            if answer["method"].as_str().is_some_and(|method| told.contains(&method)) {
+                self.complaints.push(answer["params"].to_string());
             }
         }
     }
