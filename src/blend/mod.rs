@@ -167,7 +167,7 @@ enum Mode {
     Alpha(alpha::Alpha),
 }
 
-/// Length of the list of a mode that has one [nodes].
+/// Length of the list of a mode that has one, in nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodeBudget {
     /// To begin with; by default some for each pixel.

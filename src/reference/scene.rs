@@ -1,7 +1,7 @@
 //! Whole scenes of explicit particles, composited exactly in f64: what the cloud targets of a perfect blend mode hold.
 //!
 //! Every pixel's ray is cut by every ellipsoid, and the segments are integrated by
-//! [`segments::exact`](super::segments::exact). Homogeneous ellipsoids of constant colour (`style = "homogeneous"`,
+//! [`segments::exact`]. Homogeneous ellipsoids of constant colour (`style = "homogeneous"`,
 //! `lighting = "flat"`) have segments in closed form; these are the scenes that the oracle covers.
 
 use glam::{DQuat, DVec3};
