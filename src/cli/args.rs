@@ -32,6 +32,8 @@ pub enum Command {
     Bench(BenchArgs),
     /// Compare two compositing modes with a reference: pictures, heat maps, metrics, and a report to look at
     Ab(AbArgs),
+    /// Measure how far lighting and compositing are from path-traced truth, over a suite of scenes
+    Accuracy(AccuracyArgs),
     /// Try what a driver must do for Welkin, check by check; exit status 1 if a check fails
     Conform(ConformArgs),
 }
@@ -47,7 +49,7 @@ pub struct DevicesArgs {
 }
 
 /// What picture, on what device: shared by the commands that render.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct PictureArgs {
     /// Size of the picture [pixels]
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
@@ -76,7 +78,7 @@ pub enum TablesArg {
 }
 
 /// Where a scene's values, device and tables come from.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct SceneArgs {
     /// Replace a value of the scene file, for example clouds.coverage=0.3; can be given again
     #[arg(long, value_name = "KEY=VALUE")]
@@ -343,6 +345,24 @@ impl std::fmt::Display for ReferenceArg {
             Self::Mode(blend) => blend.fmt(f),
         }
     }
+}
+
+#[derive(Args, Debug)]
+pub struct AccuracyArgs {
+    /// Suite file: cases and the variants that are compared on each (scenes/truth/suite.toml)
+    #[arg(value_name = "SUITE.toml")]
+    pub suite: PathBuf,
+    /// Directory for accuracy.json, accuracy.md and a picture for each case; made if need be
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Only this case; can be given again
+    #[arg(long, value_name = "CASE")]
+    pub only: Vec<String>,
+    /// Paths a pixel [default: those of the suite]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    pub spp: Option<u32>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]

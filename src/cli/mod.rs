@@ -1,6 +1,7 @@
 //! The command line: a thin shell around the library.
 
 mod ab;
+mod accuracy;
 mod args;
 mod bench;
 mod conform;
@@ -34,6 +35,7 @@ pub fn main() -> ExitCode {
         Command::Reference(args) => reference::run(args).map(|()| true),
         Command::Bench(args) => bench::run(args).map(|()| true),
         Command::Ab(args) => ab::run(args),
+        Command::Accuracy(args) => accuracy::run(args).map(|()| true),
         Command::Conform(args) => conform::run(args),
     };
     match outcome {

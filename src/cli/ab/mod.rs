@@ -12,6 +12,7 @@ use welkin::params::Params;
 use welkin::{Error, Result};
 
 use reference::Judge;
+pub use reference::trace;
 
 use super::args::{AbArgs, ReferenceArg};
 use super::progress::{Progress, note};

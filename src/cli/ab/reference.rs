@@ -73,7 +73,7 @@ impl Judge {
 }
 
 /// A path-traced frame. Each frame has a seed of its own, so that the noise of two frames is independent.
-fn trace(device: &mut Device, params: &Params, size: [u32; 2], spp: u32, frame: u32) -> Result<Reference> {
+pub fn trace(device: &mut Device, params: &Params, size: [u32; 2], spp: u32, frame: u32) -> Result<Reference> {
     let options = PathOptions { seed: frame, ..PathOptions::default() };
     let mut tracer = PathTracer::new(device.frames(), params, size, &options)?;
     let mut bar = Progress::start(format!("paths of frame {frame}"), u64::from(spp));
