@@ -134,6 +134,7 @@ fn describe(status: ExitStatus) -> String {
 }
 
 #[cfg(all(test, unix))]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::report;
     use super::*;
