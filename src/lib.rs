@@ -154,15 +154,19 @@
 //!   (`tests/oracle_lighting.rs::an_occluder_counts_with_its_own_density`)
 //! - **Light is found at three points of a particle**, both poles towards the sun and the centre: overlapping particles agree on
 //!   the light between them. (`tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height` checks all three)
+//! - **Sunlight fades among particles as diffusion lets it**, 1 / (1 + ξ τ), with τ counted per particle of a crowd, and a
+//!   crowd lends its members light (`glsl/lighting/transfer.glsl`); only what comes straight from the sun fades as exp(−τ).
+//!   The paper dims all of it by exp(−ξ τ), which is an option (`clouds.transfer`). Fitted to path-traced clouds: `docs/accuracy.md`
+//!   tells the gain. (`src/reference/lighting.rs::alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less`,
+//!   `tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height`)
+//! - **No smoothing by default**: against path tracing it gains nothing once light fades as above.
+//!   (`tests/oracle_lighting.rs::smoothing_and_skylight_are_those_of_the_reference`)
 //! - **Smoothing takes the layer below layer 1 too** (skipped†).
 //!   (`tests/oracle_lighting.rs::layer_one_is_smoothed_with_the_layer_below_it`)
 //! - **Every particle is lit**, seen or not: light must not change when the camera turns.
 //!   (`tests/oracle_lighting.rs::smoothing_and_skylight_are_those_of_the_reference`)
 //!
 //! Shading (Yusov 4.4, 5.4):
-//! - **Multiple scattering is looked up at five times the particle's optical radius** (`glsl/blend/shade.glsl`): light diffuses
-//!   through the cloud, of which the particle is a part. Tuned by eye; a path-traced cloud would settle it.
-//!   (`tests/shading.rs::a_lone_ellipsoid_composites_to_equation_8` holds the look-up, not the factor)
 //! - **Detail noise displaces the surface**, along silhouettes too, in octaves anchored to the world; the paper does not say how
 //!   it adds it. (`tests/oracle_detail.rs::every_texel_of_the_tile_is_the_noise_at_its_centre`)
 //!

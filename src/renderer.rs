@@ -264,7 +264,7 @@ impl Renderer {
             self.detail_filled = true;
         }
         let to_sun = self.params.sun.to_sun();
-        let occlusion = self.params.clouds.sigma_t * fill * self.params.clouds.xi;
+        let extinction = self.params.clouds.sigma_t * fill;
         let (set, grid) = (&self.set, &mut self.particles);
         let slab = match grid {
             Particles::Grid(grid, design) => {
@@ -281,7 +281,7 @@ impl Renderer {
                         greatest_extent: design.greatest_extent(),
                         planet_radius: PLANET_RADIUS,
                     },
-                    occlusion,
+                    extinction,
                 )
             }
             Particles::List(list) => {
@@ -299,7 +299,7 @@ impl Renderer {
                         greatest_extent: list.greatest_extent(),
                         planet_radius: f64::INFINITY,
                     },
-                    occlusion,
+                    extinction,
                 )
             }
         };
@@ -309,10 +309,10 @@ impl Renderer {
             Particles::Grid(grid, _) => Some(&**grid),
             Particles::List(_) => None,
         };
-        rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid))?;
+        rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid, &self.params.clouds))?;
         let (frame_buffer, cloud_base) = (&self.frame[slot], self.cloud_base());
         if self.params.sky.model == SkyModel::Atmosphere {
-            self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera, self.params.clouds.xi)?;
+            self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera)?;
         }
         self.atmosphere.record_luts(rec, frame_buffer, &frame, &self.shadow, cloud_base)?;
         let (atmosphere, background) = (&self.atmosphere, &self.background);

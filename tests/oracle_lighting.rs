@@ -7,7 +7,7 @@ use clouds::{Setup, Stages, open, read, silent};
 use glam::DVec3;
 use welkin::params::Coverage;
 use welkin::reference::grid;
-use welkin::reference::lighting::{chord_ahead, reach, smooth, sun_optical_depth};
+use welkin::reference::lighting::{chord_ahead, reach, smooth, sun_optical_depth, sun_shares};
 use welkin::shared::{Particle, ParticleLight};
 
 fn to_sun(elevation: f64) -> [f64; 3] {
@@ -27,21 +27,33 @@ fn no_occluder_is_missed_whatever_the_suns_height() {
         let counters = stages.run(&mut device, &setup);
         assert_eq!(counters.truncated, 0);
         let particles: Vec<Particle> = read(&mut device, stages.set.particles(), counters.stored);
-        let device_values: Vec<[f32; 4]> = read(&mut device, stages.lighting.transmittance(), counters.stored);
+        let device_values: Vec<ParticleLight> = read(&mut device, stages.lighting.sun_light(), counters.stored);
         let t = setup.tiling_params();
         let (mut least, mut greatest) = (1.0f64, 0.0f64);
         for index in (0..particles.len()).step_by(particles.len() / 400) {
             let start = DVec3::from_array(particles[index].centre.map(f64::from));
             let sun = DVec3::from_array(setup.to_sun);
             let pole = reach(&particles[index], sun) * sun;
-            for (point, got) in [start + pole, start, start - pole].into_iter().zip(device_values[index]) {
-                let tau = sun_optical_depth(&particles, point, sun, t.occlusion.into(), Some(index));
-                let expected = (-tau).exp();
+            let extinction = f64::from(t.extinction);
+            let tau = [start + pole, start, start - pole]
+                .map(|point| sun_optical_depth(&particles, point, sun, extinction, Some(index)));
+            let p = &particles[index];
+            let own = 2.0 * pole.length() * extinction * f64::from(p.density) * f64::from(p.fade);
+            let clouds = &setup.clouds;
+            let (diffuse, direct) = sun_shares(tau, own, clouds.xi.into(), clouds.transfer);
+            for i in 0..3 {
                 // f32 positions relative to a particle are good to 4 mm of some 100 m; the direction to 1e-7 of up to
                 // 8e4 m.
-                let got = f64::from(got);
-                assert!((got - expected).abs() < 1e-3, "{elevation}°, particle {index}: {got}, expected {expected}");
-                (least, greatest) = (least.min(expected), greatest.max(expected));
+                for (got, expected) in
+                    [(device_values[index].diffuse[i], diffuse[i]), (device_values[index].direct[i], direct[i])]
+                {
+                    let got = f64::from(got);
+                    assert!(
+                        (got - expected).abs() < 1e-3,
+                        "{elevation}°, particle {index}: {got}, expected {expected}"
+                    );
+                }
+                (least, greatest) = (least.min(direct[i]), greatest.max(direct[i]));
             }
         }
         assert!(
@@ -54,22 +66,24 @@ fn no_occluder_is_missed_whatever_the_suns_height() {
 
 #[test]
 fn smoothing_and_skylight_are_those_of_the_reference() {
-    let setup = Setup::default();
+    let mut setup = Setup::default();
+    setup.clouds.smoothing = 0.8;
     let mut device = open();
     let stages = Stages::new(&device, &setup);
     let counters = stages.run(&mut device, &setup);
-    let transmittance: Vec<[f32; 4]> = read(&mut device, stages.lighting.transmittance(), counters.stored);
-    let [pole, _, far] = [0, 1, 2].map(|i| transmittance.iter().map(|t| f64::from(t[i])).collect::<Vec<_>>());
+    let sun_light: Vec<ParticleLight> = read(&mut device, stages.lighting.sun_light(), counters.stored);
+    let [pole, _, far] = [0, 1, 2].map(|i| sun_light.iter().map(|t| f64::from(t.diffuse[i])).collect::<Vec<_>>());
     let lights: Vec<ParticleLight> = read(&mut device, stages.set.lights(), counters.stored);
     let params = setup.grid_params();
     let grid = grid::generate(&params, &[]);
     for (index, light) in lights.iter().enumerate() {
-        let smoothing = f64::from(welkin::lighting::SMOOTHING);
+        let smoothing = f64::from(setup.clouds.smoothing);
         let (sun, sky) = smooth(&grid, &params, &pole, smoothing, index);
         let (shade, _) = smooth(&grid, &params, &far, smoothing, index);
         // Sums of ten f32, one exponential each.
-        assert!((f64::from(light.sun[0]) - sun).abs() < 1e-5, "{index}: {light:?} {sun}");
-        assert!((f64::from(light.sun[2]) - shade).abs() < 1e-5);
+        assert!((f64::from(light.diffuse[0]) - sun).abs() < 1e-5, "{index}: {light:?} {sun}");
+        assert!((f64::from(light.diffuse[2]) - shade).abs() < 1e-5);
+        assert_eq!(light.direct, sun_light[index].direct, "only what was scattered is smoothed");
         assert!((f64::from(light.ambient) - sky).abs() < 1e-5, "{index}: {light:?} {sky}");
     }
     silent(&device);

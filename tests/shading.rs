@@ -23,8 +23,6 @@ use welkin::shared::{FrameParams, Particle, ParticleLight};
 const SIZE: u32 = 48;
 const BACKGROUND: [f32; 3] = [0.3, 0.5, 0.7];
 const SIGMA_T: f64 = 0.07;
-/// `CLOUD_RADII` of glsl/blend/shade.glsl: multiple scattering is that of a body this many particles wide.
-const CLOUD_RADII: f64 = 5.0;
 
 fn camera() -> Camera {
     Camera { position: [0.0; 3], aim: Aim::Angles { yaw: 0.0, pitch: 0.0 }, fov_y: 50.0 }
@@ -70,9 +68,9 @@ fn expected(p: &Particle, dir: DVec3, to_sun: DVec3, table: &ScatteringLookup, c
     let opacity = |tau: f64| -(-tau).exp_m1();
     // The colour C = L_in / (1 - T) of each kind, from the homogeneous sphere that stands for it.
     let source = |radiance: f64, radius: f64| radiance / opacity(2.0 * radius * c.mu);
-    let (single_radius, multiple_radius) = (sigma * metres, sigma * metres * CLOUD_RADII);
-    let single = source(table.single(&c, single_radius), single_radius);
-    let multiple = source(table.multiple(&c, multiple_radius), multiple_radius);
+    let radius = sigma * metres;
+    let single = source(table.single(&c, radius), radius);
+    let multiple = source(table.multiple(&c, radius), radius);
     let phase = PhaseFunction::CornetteShanks.eval(to_sun.dot(dir), f64::from(clouds.g_single));
     let colour = f64::from(clouds.albedo) * phase * single + multiple;
     BACKGROUND.map(|b| colour * opacity(tau) + (-tau).exp() * f64::from(b))
@@ -146,7 +144,7 @@ fn render(
     let frame = upload("frame", bytemuck::bytes_of(&frame(to_sun)));
     let particles = upload("particles", bytemuck::bytes_of(particle));
     let order = upload("order", bytemuck::bytes_of(&0u32));
-    let lights = upload("lights", bytemuck::bytes_of(&ParticleLight { sun: [1.0; 3], ambient: 1.0 }));
+    let lights = upload("lights", bytemuck::bytes_of(&ParticleLight::OPEN));
     let medium = upload("medium", bytemuck::bytes_of(&MediumParams::new(clouds)));
     let sky_light = upload("sky light", bytemuck::bytes_of(&sky));
     let args = upload("args", bytemuck::bytes_of(&[4u32, 1, 0, 0]));

@@ -5,8 +5,8 @@
 //
 // Most light under a thick cloud has been scattered on its way, so the shadow is not exp(-tau) but the two-stream
 // transmittance of a conservative layer, 1 / (1 + 3/4 (1 - g) tau) (Bohren, "Multiple scattering of light and some of its
-// observable consequences", 1987): an overcast day is grey, not black. That is r; g is what arrives from the sun's own
-// direction, for the shafts of light in the air.
+// observable consequences", 1987): an overcast day is grey, not black. That is r; g is what arrives from about the sun's
+// own direction, for the shafts of light in the air: forward scattering leaves it there, exp(-(1 - g) tau).
 #include "atmosphere/shadow_map.glsl"
 #include "tiling/tile.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -18,7 +18,7 @@ layout(binding = 4, rg16f) writeonly restrict uniform image2D cloud_shadow;
 layout(push_constant) uniform CloudShadowPush {
     vec2 centre;  // of the map, relative to the floating origin [m]
     float extent; // half its side [m]
-    float diffusion; // 3/4 (1 - g) / ξ: the lists hold optical depths scaled by ξ
+    float forward; // g, the asymmetry of cloud droplets
 } push;
 #include "lighting/sun_optical_depth.glsl"
 
@@ -32,6 +32,6 @@ void main() {
     float drop = dot(offset, offset) * params.tiling.inverse_diameter; // the planet falls away
     vec2 p = push.centre + offset;
     float tau = sun_optical_depth(vec3(p.x, -drop, p.y));
-    float share = mix(LEAST_SHARE, 1.0, 1.0 / (1.0 + push.diffusion * tau));
-    imageStore(cloud_shadow, texel, vec4(share, exp(-tau), 0.0, 0.0));
+    float share = mix(LEAST_SHARE, 1.0, 1.0 / (1.0 + 0.75 * (1.0 - push.forward) * tau));
+    imageStore(cloud_shadow, texel, vec4(share, exp(-(1.0 - push.forward) * tau), 0.0, 0.0));
 }

@@ -24,10 +24,6 @@ struct MediumParams {
 
 const float PI = 3.14159265358979;
 
-// Light that leaves a particle enters its neighbours and comes back: what is scattered many times is that of a body of
-// particles, about this many times wider than one (tuned until heaps are as white as clouds). Departs from Yusov 4.4.
-const float CLOUD_RADII = 5.0;
-
 const uint LIGHTING_TABLES = 0u;
 const uint LIGHTING_FLAT = 1u;
 
@@ -40,14 +36,16 @@ vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sample
     // Single scattering: of the homogeneous sphere in which this chord has this optical depth.
     float radius_single = tau_chord / (2.0 * mu);
     // Multiple scattering is a matter of the whole particle.
-    float radius_multiple = frame.sigma_t * p.density * p.fade * frame.fill * ray.metres * CLOUD_RADII;
+    float radius_multiple = frame.sigma_t * p.density * p.fade * frame.fill * ray.metres;
     float single = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_single).x;
     float multiple = scattering_source_lookup(scattering, entry_us, ray.dir_us, to_sun_us, radius_multiple).y;
     float p_sun = phase(dot(frame.to_sun, dir), medium.g_single, medium.phase_function);
     // Light fades along the sun's axis, from the pole that faces it to the far one.
     float along = dot(entry_us, to_sun_us);
-    float reaches = along > 0.0 ? mix(light.sun.y, light.sun.x, along) : mix(light.sun.y, light.sun.z, -along);
-    vec3 sunlight = sky.sun_irradiance_clouds * reaches * (medium.albedo * p_sun * single + multiple);
+    float towards = max(along, 0.0), away = max(-along, 0.0);
+    vec3 share = vec3(towards, 1.0 - towards - away, away);
+    vec3 sunlight = sky.sun_irradiance_clouds * (medium.albedo * p_sun * single * dot(light.direct, share)
+                                                 + multiple * dot(light.diffuse, share));
 
     // Sky and ground as two half-spheres of constant radiance E / π, seen by the surface; creases, which lie deep below the
     // ellipsoid, are brighter than edges (Yusov 4.4).

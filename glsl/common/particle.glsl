@@ -12,9 +12,12 @@ struct Particle {
     uint  id;         // stable identity, also the seed of everything random about it
 };
 
+// Shares of the sunlight at the pole facing the sun, the centre and the far pole of a particle.
 struct ParticleLight {
-    vec3  sun;        // share of the sunlight that reaches the pole facing the sun, the centre and the far pole [0, 1]
+    vec3  diffuse;    // of what is scattered many times, the particle's neighbours lending some: 0 to 1 + GATHERED
     float ambient;    // visibility of the sky [0, 1]
+    vec3  direct;     // of what comes straight from the sun [0, 1]
+    float reserved;
 };
 
 // Rotates v by the unit quaternion q.

@@ -1,4 +1,4 @@
-// Diffusion of light in the body of a cloud: a low-pass filter of the sun's transmittance over a particle and its
+// Diffusion of light in the body of a cloud: a low-pass filter of the diffuse share of sunlight over a particle and its
 // neighbours in the grid (above, below and eight around), weighted with their density, and the share of the sky that
 // the particle sees. Yusov 5.3, step 3.
 // Every layer has both its neighbours, layer 1 its lower one too (which Yusov's released code skips). A puff has the ball
@@ -18,7 +18,7 @@ layout(set = 0, binding = 2, std430) readonly restrict buffer Particles { Partic
 layout(set = 0, binding = 3, std430) readonly restrict buffer ParticleCells { uint cell_and_layer[]; } particle_cells;
 layout(set = 0, binding = 4, std430) readonly restrict buffer CellShapes { vec4 shape[]; } cell_shapes;
 layout(set = 0, binding = 5, std430) readonly restrict buffer CellFirst { uint first[]; } cell_first;
-layout(set = 0, binding = 6, std430) readonly restrict buffer SunTransmittance { vec4 transmittance[]; } sun;
+layout(set = 0, binding = 6, std430) readonly restrict buffer SunLight { ParticleLight at[]; } sun;
 layout(set = 0, binding = 7, std430) writeonly restrict buffer ParticleLights { ParticleLight light[]; } particle_lights;
 layout(push_constant) uniform SmoothPush {
     float smoothing;     // weight of a neighbour against 1 of the particle itself; 0: none
@@ -27,7 +27,7 @@ layout(push_constant) uniform SmoothPush {
 void add(uint slot, float share, inout vec3 weighted, inout float weights) {
     if (slot >= counters.count.stored) return;
     float weight = share * particles.particle[slot].density * particles.particle[slot].fade;
-    weighted += weight * sun.transmittance[slot].xyz;
+    weighted += weight * sun.at[slot].diffuse;
     weights += weight;
 }
 
@@ -35,8 +35,7 @@ void main() {
     uint index = linear_index();
     if (index >= counters.count.stored) return;
     uint packed_cell = particle_cells.cell_and_layer[index];
-    vec3 transmittance = sun.transmittance[index].xyz;
-    float sky = 1.0;
+    ParticleLight light = sun.at[index];
     if (packed_cell != NO_CELL) {
         uint cell = packed_cell >> 5u, layer = packed_cell & 31u;
         uint dim = params.grid.ring_dim;
@@ -71,8 +70,8 @@ void main() {
                 }
             }
         }
-        transmittance = weights > 0.0 ? weighted / weights : transmittance;
-        sky = sky_visibility(open / 9.0);
+        if (weights > 0.0) light.diffuse = weighted / weights;
+        light.ambient = sky_visibility(open / 9.0);
     }
-    particle_lights.light[index] = ParticleLight(transmittance, sky);
+    particle_lights.light[index] = light;
 }

@@ -1,5 +1,5 @@
-// Sunlight that reaches every particle, as transmittance at three points on the ray through its centre: the pole that
-// faces the sun, the centre, the far pole. One walk of the list serves all three. One thread a particle. Yusov 5.3, step
+// Sunlight that reaches every particle, at three points on the ray through its centre: the pole that faces the sun, the
+// centre, the far pole. One walk of the list serves all three. One thread a particle. Yusov 5.3, step
 // 2, which knows the centre alone; with three, overlapping particles agree on the light between them.
 // Particles outside the view are lit too: smoothing reads them, and light must not change when the camera turns.
 #version 460
@@ -14,7 +14,12 @@ layout(set = 0, binding = 1, std430) readonly restrict buffer Particles { Partic
 layout(set = 0, binding = 2, std430) readonly restrict buffer TileHeads { uint head[]; } tile_heads;
 layout(set = 0, binding = 3, std430) readonly restrict buffer TileNodes { TileNode node[]; } tile_nodes;
 layout(set = 0, binding = 4, std430) restrict buffer CountersBuffer { Counters count; } counters;
-layout(set = 0, binding = 5, std430) writeonly restrict buffer SunTransmittance { vec4 transmittance[]; } sun;
+layout(set = 0, binding = 5, std430) writeonly restrict buffer SunLight { ParticleLight at[]; } sun;
+layout(push_constant) uniform SunPush {
+    float xi;          // clouds.xi
+    uint  transfer;    // TRANSFER_*
+} push;
+#include "lighting/transfer.glsl"
 #include "lighting/sun_optical_depth.glsl"
 
 void main() {
@@ -26,5 +31,7 @@ void main() {
     vec3 optical_depths = sun_optical_depths(particle.centre, reach, index, visited);
     atomicMax(counters.count.longest_walk, visited);
     if (visited > params.tiling.traversal_limit) atomicAdd(counters.count.truncated, 1u);
-    sun.transmittance[index] = vec4(exp(-optical_depths), 0.0);
+    float own = 2.0 * reach * params.tiling.extinction * particle.density * particle.fade;
+    SunShares shares = sun_shares(optical_depths, own, push.xi, push.transfer);
+    sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, 0.0);
 }

@@ -58,7 +58,7 @@ vec3 sun_optical_depths(vec3 p_ws, float reach, uint self, out uint visited) {
         }
         node = entry.next;
     }
-    return params.tiling.occlusion * sum;
+    return params.tiling.extinction * sum;
 }
 
 // For any point at all: on the ground, in the air, on a cloud.

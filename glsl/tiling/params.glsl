@@ -21,7 +21,7 @@ struct TilingParams {
     uint tile_dim;         // tiles along an edge
     uint node_capacity;
     uint traversal_limit;  // nodes one receiver visits at most
-    float occlusion;       // sigma_t · mean fill of a particle · xi: extinction that counts for occlusion [1/m]
+    float extinction;      // sigma_t · mean fill of a particle: extinction at relative density 1 [1/m]
     float greatest_extent; // no particle reaches farther from its centre [m]
     uint levels_per_particle; // levels that one particle's shadow reaches at most
     uint unused;

@@ -22,9 +22,9 @@ const ASYMMETRY: f32 = 0.85;
 struct Push {
     centre: [f32; 2],
     extent: f32,
-    diffusion: f32,
+    forward: f32,
 }
-assert_layout!(Push, cloud_shadow_push, { centre: CENTRE, extent: EXTENT, diffusion: DIFFUSION });
+assert_layout!(Push, cloud_shadow_push, { centre: CENTRE, extent: EXTENT, forward: FORWARD });
 
 /// A map of the share of sunlight that the clouds let through to the ground, texels growing with distance from the camera
 /// (`glsl/atmosphere/shadow_map.glsl`).
@@ -55,15 +55,13 @@ impl CloudShadow {
         })
     }
 
-    /// Walks the light tiles of this frame, `camera` being relative to the floating origin. `xi` is the factor by which the
-    /// tiles' optical depths are scaled.
+    /// Walks the light tiles of this frame, `camera` being relative to the floating origin.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,
         tiling: &Tiling,
         particles: &Buffer,
         camera: [f32; 3],
-        xi: f32,
     ) -> Result<()> {
         (self.centre, self.extent) = ([camera[0], camera[2]], SHADOW_EXTENT);
         let bindings = shader::Bindings {
@@ -73,8 +71,7 @@ impl CloudShadow {
             tile_nodes: tiling.nodes(),
             cloud_shadow: &self.image,
         };
-        let push =
-            Push { centre: self.centre, extent: self.extent, diffusion: 0.75 * (1.0 - ASYMMETRY) / xi.max(1e-3) };
+        let push = Push { centre: self.centre, extent: self.extent, forward: ASYMMETRY };
         rec.pass("cloud shadow", |rec| rec.dispatch(&self.pipeline, &bindings, &push, [SIZE, SIZE, 1]))
     }
 

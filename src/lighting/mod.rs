@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! let lighting = Lighting::new(&gpu, set.capacity())?;
-//! rec.pass("lighting", |rec| lighting.record(rec, &tiling, &set, Some(&grid)))?;
+//! rec.pass("lighting", |rec| lighting.record(rec, &tiling, &set, Some(&grid), &clouds))?;
 //! ```
 //!
 //! Other shaders get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
@@ -14,11 +14,21 @@ use bytemuck::{Pod, Zeroable};
 use crate::Result;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Recorder};
 use crate::grid::{Grid, GridParams, ParticleSet};
+use crate::params::{Clouds, Transfer};
 use crate::shaders::{lighting_smooth_comp as smooth, lighting_sun_comp as sun};
+use crate::shared::ParticleLight;
 use crate::tiling::Tiling;
 
-/// Weight of a grid neighbour in smoothing, against 1 of the particle itself (tuned).
-pub const SMOOTHING: f32 = 0.8;
+/// Light that a particle in a crowd gets from its neighbours, at most, as share of its own
+/// (`glsl/lighting/transfer.glsl`).
+pub const GATHERED: f32 = 1.2;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct SunPush {
+    xi: f32,
+    transfer: u32,
+}
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -30,7 +40,7 @@ struct SmoothPush {
 pub struct Lighting {
     sun: ComputePipeline,
     smooth: ComputePipeline,
-    transmittance: Buffer,
+    sun_light: Buffer,
     /// Stand-ins for the grid's lists when particles come from a list.
     no_grid: [Buffer; 3],
     capacity: u32,
@@ -48,16 +58,16 @@ impl Lighting {
         Ok(Self {
             sun: ComputePipeline::new(gpu, &sun::PROGRAM, &[])?,
             smooth: ComputePipeline::new(gpu, &smooth::PROGRAM, &[])?,
-            transmittance: Buffer::array::<[f32; 4]>(gpu, "sun transmittance", capacity as usize)?,
+            sun_light: Buffer::array::<ParticleLight>(gpu, "sun light", capacity as usize)?,
             no_grid,
             capacity,
         })
     }
 
-    /// Sun transmittance of every particle before smoothing: at the pole facing the sun, the centre, the far pole, and 0.
+    /// [`ParticleLight`] of every particle before smoothing, without the sky.
     #[must_use]
-    pub fn transmittance(&self) -> &Buffer {
-        &self.transmittance
+    pub fn sun_light(&self) -> &Buffer {
+        &self.sun_light
     }
 
     /// Follows a [`ParticleSet`] that has grown; the device must be idle. True if it did.
@@ -77,6 +87,7 @@ impl Lighting {
         tiling: &Tiling,
         set: &ParticleSet,
         grid: Option<&Grid>,
+        clouds: &Clouds,
     ) -> Result<()> {
         assert!(set.capacity() <= self.capacity, "the particle set has grown: call grow() too");
         let slot = rec.slot();
@@ -88,9 +99,9 @@ impl Lighting {
                 tile_heads: tiling.heads(),
                 tile_nodes: tiling.nodes(),
                 counters: set.counters(),
-                sun: &self.transmittance,
+                sun: &self.sun_light,
             },
-            &(),
+            &SunPush { xi: clouds.xi, transfer: u32::from(clouds.transfer == Transfer::Exponential) },
             set.args(),
             ParticleSet::PARTICLE_ARGS,
         )?;
@@ -104,10 +115,10 @@ impl Lighting {
                 particle_cells: set.cells(),
                 cell_shapes: grid.map_or(no_shapes, Grid::cell_shapes),
                 cell_first: grid.map_or(no_first, Grid::cell_first),
-                sun: &self.transmittance,
+                sun: &self.sun_light,
                 particle_lights: set.lights(),
             },
-            &SmoothPush { smoothing: SMOOTHING },
+            &SmoothPush { smoothing: clouds.smoothing },
             set.args(),
             ParticleSet::PARTICLE_ARGS,
         )

@@ -2,7 +2,7 @@
 //!
 //! A later version turns a row's `here` to true, and adds its combination to [`COMBINATIONS`]; nothing else changes.
 
-use super::{Blend, Lighting, Params, Phase, Source, Style};
+use super::{Blend, Lighting, Params, Phase, Source, Style, Transfer};
 use crate::{Error, Result};
 
 /// One name of an axis.
@@ -81,6 +81,10 @@ pub const STYLES: &[AxisValue<Style>] = &[
     here("threshold", Style::Threshold),
     here("homogeneous", Style::Homogeneous),
 ];
+
+/// `clouds.transfer`.
+pub const TRANSFERS: &[AxisValue<Transfer>] =
+    &[here("diffusion", Transfer::Diffusion), here("exponential", Transfer::Exponential)];
 
 /// `clouds.phase`.
 pub const PHASES: &[AxisValue<Phase>] =

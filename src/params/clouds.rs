@@ -34,9 +34,14 @@ pub struct Clouds {
     pub g_multiple: f32,
     /// Orders of scattering in the tables; 0 sums until converged. Default 0; Yusov stops at 18.
     pub orders: u32,
-    /// Scale of an occluding particle's extinction on the way to the sun, ξ. Default 0.05 (the authors' scene): a
-    /// particle between the sun and another one scatters most of what it takes forward again.
+    /// How sunlight fares among particles. Default [`Transfer::Diffusion`].
+    pub transfer: Transfer,
+    /// How much sunlight a particle takes from those behind it, per unit of its optical depth, ξ. Default
+    /// [`Transfer::xi`].
     pub xi: f32,
+    /// How much light a particle of the grid shares with each of its neighbours, against 1 of its own, 0 to 10 (Yusov 5.3,
+    /// step 3). Default 0: no gain against path tracing (`docs/accuracy.md`).
+    pub smoothing: f32,
     /// No particle is made farther from the camera than this [m]. Default 1e5 (the authors' scene).
     pub particle_cutoff: f32,
 }
@@ -101,6 +106,27 @@ pub enum Lighting {
     Path,
 }
 
+/// How the sunlight that reaches a particle depends on the optical depth τ of the particles in front of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transfer {
+    /// Light scattered many times fades as 1 / (1 + ξ τ), and a crowd of particles is brighter than one alone
+    /// (`glsl/lighting/transfer.glsl`); what comes straight from the sun fades as exp(-τ).
+    Diffusion,
+    /// All of it fades as exp(-ξ τ) (Yusov 5.3).
+    Exponential,
+}
+
+impl Transfer {
+    /// The ξ that goes with it: fitted to path-traced clouds (`docs/accuracy.md`), or that of the authors' scene.
+    #[must_use]
+    pub fn xi(self) -> f32 {
+        match self {
+            Self::Diffusion => 0.15,
+            Self::Exponential => 0.05,
+        }
+    }
+}
+
 /// The density inside a particle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
@@ -162,7 +188,9 @@ impl Default for Clouds {
             g_single: 0.9,
             g_multiple: 0.7,
             orders: 0,
-            xi: 0.05,
+            transfer: Transfer::Diffusion,
+            xi: Transfer::Diffusion.xi(),
+            smoothing: 0.0,
             particle_cutoff: 1.0e5,
         }
     }
@@ -197,6 +225,7 @@ impl Clouds {
         check::within("clouds.g_multiple", self.g_multiple, -0.99..=0.99, "")?;
         check::within("clouds.orders", self.orders, 0..=1000, "(0: until converged)")?;
         check::within("clouds.xi", self.xi, 0.0..=1.0, "")?;
+        check::within("clouds.smoothing", self.smoothing, 0.0..=10.0, "")?;
         check::within("clouds.particle_cutoff", self.particle_cutoff, 1.0e3..=1.0e6, "m")
     }
 }

@@ -16,9 +16,9 @@ mod sky;
 pub mod solar;
 mod sun;
 
-pub use axes::{AxisValue, BLENDS, LIGHTINGS, PHASES, SOURCES, STYLES, SourceKind, lookup};
+pub use axes::{AxisValue, BLENDS, LIGHTINGS, PHASES, SOURCES, STYLES, SourceKind, TRANSFERS, lookup};
 pub use camera::{Aim, Animation, Basis, Camera};
-pub use clouds::{Clouds, Coverage, CoverageMap, Lighting, ParticleDesc, Phase, Source, Style};
+pub use clouds::{Clouds, Coverage, CoverageMap, Lighting, ParticleDesc, Phase, Source, Style, Transfer};
 pub use quality::{Blend, Precision, Preset, Quality, WINDOWS};
 pub use sky::{Film, Ground, Sky, SkyModel, ToneCurve};
 pub use sun::{Sun, SunPosition};

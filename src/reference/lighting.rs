@@ -3,6 +3,8 @@
 use glam::{DQuat, DVec3};
 
 use crate::grid::GridParams;
+use crate::lighting::GATHERED;
+use crate::params::Transfer;
 use crate::reference::grid::{Grid, puff_host};
 use crate::shared::Particle;
 
@@ -26,18 +28,35 @@ pub fn chord_ahead(particle: &Particle, start: DVec3, direction: DVec3) -> f64 {
     ((-b + root) / a).max(0.0) - ((-b - root) / a).max(0.0)
 }
 
-/// Optical depth that counts for occlusion from `start` towards the light; each occluder has its own density.
+/// Optical depth of other particles from `start` towards the light; each occluder has its own density. `extinction`: at
+/// relative density 1 [1/m].
 #[must_use]
 pub fn sun_optical_depth(
     particles: &[Particle],
     start: DVec3,
     to_sun: DVec3,
-    occlusion: f64,
+    extinction: f64,
     this: Option<usize>,
 ) -> f64 {
     let others = particles.iter().enumerate().filter(|&(i, _)| Some(i) != this);
-    occlusion
+    extinction
         * others.map(|(_, p)| f64::from(p.density) * f64::from(p.fade) * chord_ahead(p, start, to_sun)).sum::<f64>()
+}
+
+/// The shares of sunlight that feed what is scattered many times, and that come straight from the sun, at the points of a
+/// particle that have `tau` of others in front: the pole facing the sun, the centre, the far pole. `own`: the particle's
+/// own optical depth from pole to pole.
+#[must_use]
+pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, transfer: Transfer) -> ([f64; 3], [f64; 3]) {
+    match transfer {
+        Transfer::Exponential => (tau.map(|tau| (-xi * tau).exp()), tau.map(|tau| (-xi * tau).exp())),
+        Transfer::Diffusion => {
+            let crowd = 1.0 + (tau[2] - tau[0]).max(0.0) / own.max(1e-3);
+            let gathered = 1.0 + f64::from(GATHERED) * (1.0 - 1.0 / crowd);
+            let shared_by = [crowd, crowd, crowd.sqrt()];
+            (std::array::from_fn(|i| gathered / (1.0 + xi * tau[i] / shared_by[i])), tau.map(|tau| (-tau).exp()))
+        }
+    }
 }
 
 fn sky_openness(above: f64) -> f64 {
@@ -51,9 +70,9 @@ pub fn reach(particle: &Particle, to_sun: DVec3) -> f64 {
     1.0 / (local / vec(particle.semi_axes)).length()
 }
 
-/// Smoothed transmittance and sky visibility of particle `index` of the grid.
+/// Smoothed share of sunlight and visibility of the sky of particle `index` of the grid.
 #[must_use]
-pub fn smooth(grid: &Grid, p: &GridParams, transmittance: &[f64], smoothing: f64, index: usize) -> (f64, f64) {
+pub fn smooth(grid: &Grid, p: &GridParams, share_of_sun: &[f64], smoothing: f64, index: usize) -> (f64, f64) {
     let packed = grid.cell_and_layer[index];
     let (cell, within) = ((packed >> 5) as usize, packed & 31);
     let dim = p.ring_dim as i64;
@@ -86,7 +105,7 @@ pub fn smooth(grid: &Grid, p: &GridParams, transmittance: &[f64], smoothing: f64
     let (mut weighted, mut weights) = (0.0, 0.0);
     for (slot, share) in slots {
         let weight = share * f64::from(grid.particles[slot].density) * f64::from(grid.particles[slot].fade);
-        weighted += weight * transmittance[slot];
+        weighted += weight * share_of_sun[slot];
         weights += weight;
     }
     let mut open = 0.0;
@@ -96,5 +115,35 @@ pub fn smooth(grid: &Grid, p: &GridParams, transmittance: &[f64], smoothing: f64
             open += sky_openness(f64::from(top) - height);
         }
     }
-    (if weights > 0.0 { weighted / weights } else { transmittance[index] }, 0.22 + 0.78 * open / 9.0)
+    (if weights > 0.0 { weighted / weights } else { share_of_sun[index] }, 0.22 + 0.78 * open / 9.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less() {
+        for transfer in [Transfer::Diffusion, Transfer::Exponential] {
+            let xi = f64::from(transfer.xi());
+            assert_eq!(sun_shares([0.0; 3], 5.0, xi, transfer), ([1.0; 3], [1.0; 3]));
+            let mut before = f64::INFINITY;
+            for tau in [0.1, 1.0, 10.0, 100.0] {
+                // The same in front of all three points: nobody overlaps.
+                let (diffuse, direct) = sun_shares([tau; 3], 5.0, xi, transfer);
+                assert!(diffuse[0] == diffuse[1] && diffuse[1] == diffuse[2]);
+                assert!(diffuse[0] < before && diffuse[0] >= direct[0] && direct[0] > 0.0, "{transfer:?} {tau}");
+                before = diffuse[0];
+            }
+        }
+    }
+
+    #[test]
+    fn a_crowd_is_brighter_than_its_members_and_by_no_more_than_it_can_lend() {
+        let xi = f64::from(Transfer::Diffusion.xi());
+        let lone = sun_shares([3.0, 3.0, 3.0], 4.0, xi, Transfer::Diffusion).0;
+        let crowd = sun_shares([3.0, 13.0, 23.0], 4.0, xi, Transfer::Diffusion).0;
+        assert!(crowd[0] > lone[0], "{crowd:?} {lone:?}");
+        assert!(crowd[0] < 1.0 + f64::from(GATHERED) && crowd[0] > crowd[1] && crowd[1] > crowd[2]);
+    }
 }

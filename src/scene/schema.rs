@@ -8,7 +8,7 @@ use toml::value::{Datetime, Offset};
 use super::{coverage, particles};
 use crate::params::{
     Aim, Animation, Camera, Clouds, Coverage, Film, Ground, LIGHTINGS, PHASES, Params, Precision, Preset, Quality,
-    SOURCES, STYLES, Sky, SkyModel, Source, SourceKind, Sun, SunPosition, ToneCurve, lookup, solar,
+    SOURCES, STYLES, Sky, SkyModel, Source, SourceKind, Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
 };
 use crate::{Error, Result};
 
@@ -65,7 +65,9 @@ struct CloudKeys {
     g_single: Option<f32>,
     g_multiple: Option<f32>,
     orders: Option<u32>,
+    transfer: Option<String>,
     xi: Option<f32>,
+    smoothing: Option<f32>,
     particle_cutoff: Option<f32>,
     file: Option<PathBuf>,
     particle: Option<Vec<ParticleKeys>>,
@@ -245,7 +247,9 @@ impl CloudKeys {
         set(&mut clouds.g_single, self.g_single);
         set(&mut clouds.g_multiple, self.g_multiple);
         set(&mut clouds.orders, self.orders);
-        set(&mut clouds.xi, self.xi);
+        set_named(&mut clouds.transfer, self.transfer.as_ref(), |name| lookup(TRANSFERS, "clouds.transfer", name))?;
+        clouds.xi = self.xi.unwrap_or(clouds.transfer.xi());
+        set(&mut clouds.smoothing, self.smoothing);
         set(&mut clouds.particle_cutoff, self.particle_cutoff);
         clouds.coverage = self.coverage(base)?;
         clouds.source = self.source(base)?;

@@ -45,8 +45,8 @@ pub struct TilingParams {
     pub node_capacity: u32,
     /// Nodes that one receiver visits at most.
     pub traversal_limit: u32,
-    /// sigma_t · mean fill of a particle · ξ: extinction that counts for occlusion [1/m].
-    pub occlusion: f32,
+    /// sigma_t · mean fill of a particle: extinction at relative density 1 [1/m].
+    pub extinction: f32,
     /// No particle reaches farther from its centre [m].
     pub greatest_extent: f32,
     /// Levels that one particle's shadow reaches at most.
@@ -59,7 +59,7 @@ assert_layout!(TilingParams, tiling_params, {
     to_sun: TO_SUN, base: BASE, u_axis: U_AXIS, thickness: THICKNESS, v_axis: V_AXIS,
     inverse_diameter: INVERSE_DIAMETER, centre: CENTRE, reach: REACH, level_rect: LEVEL_RECT,
     level_range: LEVEL_RANGE, level_count: LEVEL_COUNT, tile_dim: TILE_DIM, node_capacity: NODE_CAPACITY,
-    traversal_limit: TRAVERSAL_LIMIT, occlusion: OCCLUSION, greatest_extent: GREATEST_EXTENT,
+    traversal_limit: TRAVERSAL_LIMIT, extinction: EXTINCTION, greatest_extent: GREATEST_EXTENT,
     levels_per_particle: LEVELS_PER_PARTICLE,
 });
 
@@ -94,9 +94,9 @@ pub struct Slab<'a> {
 }
 
 impl TilingParams {
-    /// Tiles for light from `to_sun` (unit). `occlusion` = sigma_t · mean fill · ξ [1/m].
+    /// Tiles for light from `to_sun` (unit). `extinction` = sigma_t · mean fill [1/m].
     #[must_use]
-    pub fn new(to_sun: [f64; 3], slab: &Slab<'_>, occlusion: f32) -> Self {
+    pub fn new(to_sun: [f64; 3], slab: &Slab<'_>, extinction: f32) -> Self {
         assert!(slab.half_widths.len() <= LEVEL_CAPACITY, "too many levels");
         let horizontal = to_sun[0].hypot(to_sun[2]);
         // Horizontal, so that a low sun squeezes one axis only.
@@ -149,7 +149,7 @@ impl TilingParams {
         params.level_count = slab.half_widths.len() as u32;
         params.tile_dim = TILE_DIM;
         params.traversal_limit = TRAVERSAL_LIMIT;
-        params.occlusion = occlusion;
+        params.extinction = extinction;
         params.greatest_extent = slab.greatest_extent;
         params
     }

@@ -118,7 +118,7 @@ pub fn draw_with_budget(
 ) -> (Picture, u32) {
     let gpu = device.gpu().clone();
     let order: Vec<u32> = (0..particles.len() as u32).collect();
-    let lights = vec![ParticleLight { sun: [0.0; 3], ambient: 0.0 }; particles.len()];
+    let lights = vec![ParticleLight::OPEN; particles.len()];
     let upload = |name, bytes: &[u8]| Buffer::upload(&gpu, name, bytes).unwrap();
     let frame = upload("frame", bytemuck::bytes_of(&frame()));
     let particle_buffer = upload("particles", bytemuck::cast_slice(particles));

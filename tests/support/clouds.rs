@@ -64,7 +64,7 @@ impl Setup {
             greatest_extent: design.greatest_extent(),
             planet_radius: PLANET,
         };
-        TilingParams::new(self.to_sun, &slab, self.clouds.sigma_t * 0.5 * self.clouds.xi)
+        TilingParams::new(self.to_sun, &slab, self.clouds.sigma_t * 0.5)
     }
 
     /// A view along +x, a little upwards.
@@ -117,7 +117,9 @@ impl Stages {
                 rec.pass("grid", |rec| self.grid.record(rec, &setup.grid_params(), &self.set))?;
                 rec.pass("compact", |rec| self.compact.record(rec, &self.set, &planes, frame.camera))?;
                 rec.pass("tiling", |rec| self.tiling.record(rec, &setup.tiling_params(), &self.set))?;
-                rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, &self.set, Some(&self.grid)))?;
+                rec.pass("lighting", |rec| {
+                    self.lighting.record(rec, &self.tiling, &self.set, Some(&self.grid), &setup.clouds)
+                })?;
                 self.counters.record(rec, &self.set);
                 Ok(rec.slot())
             })
