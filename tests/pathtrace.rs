@@ -412,3 +412,17 @@ fn the_picture_is_the_renderers_over_black_and_over_a_sky() {
     }
     silent(&device);
 }
+
+/// A ray along the walls of the grid's cells has components of 0: it must cross cells, not creep along them.
+#[test]
+fn a_sun_on_the_horizon_due_south_costs_no_more_steps_than_another() {
+    let mut device = open();
+    let steps = |device: &mut Standalone, elevation, azimuth| {
+        let mut params = scene(vec![ball([0.0, 0.0, -300.0], [60.0; 3], 1.0, [1.0; 3])], Style::Homogeneous);
+        params.sun = Sun { position: SunPosition::Angles { elevation, azimuth }, ..Sun::default() };
+        traced(device, &params, [8, 8], PathOptions::default(), 16).work().steps as f64
+    };
+    let (along, across) = (steps(&mut device, 0.0, 180.0), steps(&mut device, 20.0, 200.0));
+    assert!(along < 3.0 * across, "{along} steps, {across} for another sun");
+    silent(&device);
+}

@@ -45,7 +45,8 @@ vec3 inverse_of(vec3 dir) { return 1.0 / mix(dir, vec3(1e-12), lessThan(abs(dir)
 
 // Distance from `origin` to where the ray leaves a cubic cell.
 float wall_ahead(vec3 origin, vec3 dir, vec3 corner, float edge) {
-    vec3 wall = (corner + mix(vec3(0.0), vec3(edge), greaterThan(dir, vec3(0.0))) - origin) * inverse_of(dir);
+    vec3 inverse = inverse_of(dir); // its signs: a direction along a wall has one too
+    vec3 wall = (corner + mix(vec3(0.0), vec3(edge), greaterThan(inverse, vec3(0.0))) - origin) * inverse;
     return min(wall.x, min(wall.y, wall.z));
 }
 

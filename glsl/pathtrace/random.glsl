@@ -1,6 +1,5 @@
 // Counter-based random numbers: pcg4d of Jarzynski and Olano ("Hash Functions for GPU Rendering", 2020). A draw is a
-// function of pixel, sample, number of the draw and seed, so nothing depends on scheduling. CPU twin:
-// src/reference/path.rs.
+// function of pixel, sample, number of the draw and seed, so nothing depends on scheduling.
 #ifndef PATHTRACE_RANDOM
 #define PATHTRACE_RANDOM
 
