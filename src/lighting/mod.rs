@@ -36,7 +36,7 @@ struct SmoothPush {
     smoothing: f32,
 }
 
-/// Computes [`ParticleLight`](crate::shared::ParticleLight) for every stored particle.
+/// Computes [`ParticleLight`] for every stored particle.
 pub struct Lighting {
     sun: ComputePipeline,
     smooth: ComputePipeline,
