@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use std::ops::ControlFlow;
+use std::time::Instant;
 use welkin::Params;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::params::{
@@ -10,8 +11,10 @@ use welkin::params::{
 use welkin::pathtrace::{Environment, Estimator, PathOptions, PathTracer, PixelSums, State, SunShape};
 use welkin::reference::grid::generate;
 use welkin::reference::monte_carlo::{Medium, multiple_scattering};
+use welkin::reference::path::Sunlit;
 use welkin::reference::phase::PhaseFunction;
 use welkin::reference::scattering::single_scattering;
+use welkin::reference::scene::{Ellipsoid, Scene};
 use welkin::reference::segments::{self, Segment};
 use welkin::reference::sphere::LitRay;
 
@@ -301,6 +304,50 @@ fn a_single_sphere_agrees_with_the_tables_monte_carlo() {
         println!("sphere, sun {elevation}: {sum:.4} and {wanted:.4}, {z:.2} standard errors of {:.4}", variance.sqrt());
         assert!(z.abs() < 3.0 && variance.sqrt() < 0.04 * wanted, "{sum} {wanted} {z}");
     }
+    silent(&device);
+}
+
+/// A heap in the sun, against a loop on the CPU that shares no method with the device. Both tell their paths per second.
+#[test]
+fn a_heap_agrees_with_regular_tracking_on_the_cpu() {
+    let mut device = open();
+    let particles = heap(30);
+    let mut params = scene(particles.clone(), Style::Homogeneous);
+    params.sun = Sun {
+        position: SunPosition::Angles { elevation: 40.0, azimuth: 240.0 },
+        irradiance: [1.0; 3],
+        ..Sun::default()
+    };
+    params.clouds.g_single = params.clouds.g_multiple; // a sharper peak is for the CPU loop to hit by chance
+    let (size, samples) = ([24, 24], 128);
+    let started = Instant::now();
+    let tracer = traced(&mut device, &params, size, PathOptions::default(), samples);
+    let device_rate = f64::from(size[0] * size[1] * samples) / started.elapsed().as_secs_f64();
+    let pixels = tracer.state().pixels;
+    let (clouds, to_sun) = (&params.clouds, DVec3::from_array(params.sun.to_sun()));
+    let ellipsoids = particles.iter().map(|p| Ellipsoid::of_desc(p, clouds.sigma_t)).collect();
+    let medium = Medium {
+        phase: PhaseFunction::CornetteShanks,
+        g_sun: clouds.g_single.into(),
+        g: clouds.g_multiple.into(),
+        albedo: 1.0,
+    };
+    let sunlit = Sunlit { scene: Scene { ellipsoids }, medium, to_sun };
+    let (mut random, paths, started) = (1, 16u32, Instant::now());
+    let (mut sum, mut wanted, mut variance) = (0.0, 0.0, 0.0);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let dir = DVec3::from_array(params.camera.ray(i as u32 % size[0], i as u32 / size[0], size[0], size[1]));
+        let values: Vec<f64> = (0..paths).map(|_| sunlit.path(DVec3::ZERO, dir, &mut random)).collect();
+        let mean = values.iter().sum::<f64>() / f64::from(paths);
+        let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+        variance += squares / f64::from(paths * (paths - 1)) + error(pixel.radiance_m2[0], samples).powi(2);
+        sum += f64::from(pixel.radiance[0]);
+        wanted += mean;
+    }
+    let rate = f64::from(size[0] * size[1] * paths) / started.elapsed().as_secs_f64();
+    println!("{device_rate:.0} paths/s on the device, {rate:.0} on one CPU thread");
+    let z = (sum - wanted) / variance.sqrt();
+    assert!(z.abs() < 3.0 && variance.sqrt() < 0.04 * wanted, "{sum} {wanted} {z} {}", variance.sqrt());
     silent(&device);
 }
 

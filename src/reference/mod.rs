@@ -10,6 +10,7 @@ pub mod grid;
 pub mod lighting;
 pub mod monte_carlo;
 pub mod optical_depth;
+pub mod path;
 pub mod phase;
 pub mod quadrature;
 pub mod scattering;
