@@ -127,7 +127,7 @@
 //!   clamp†. (`src/lut/axes.rs::texel_centres_map_back_to_themselves_and_domain_ends_are_texels`)
 //! - **Source functions are stored**, L / (1 − e^−τ), single scattering less a closed form: they stay smooth where the chord
 //!   shrinks to nothing. Radiance is multiplied by (1 − T) once, in compositing (twice†).
-//!   (`tests/tables.rs::multiple_scattering_agrees_with_monte_carlo_between_texels`)
+//!   (`tests/tables.rs::multiple_scattering_agrees_with_monte_carlo_at_every_density_and_between`)
 //! - **Scattering orders are summed until they converge** by a Krylov solver in angular momentum; the paper stops at 18, which
 //!   loses light in thick bodies (`orders = 18` is an option). (`tests/tables.rs::no_energy_is_lost_or_made`,
 //!   `tests/transport.rs::isotropic_scattering_agrees_with_the_exact_solution_of_the_sphere`)

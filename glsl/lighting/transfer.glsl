@@ -12,7 +12,7 @@ struct SunShares {
 };
 
 // Light that a particle in a crowd gets from its neighbours, at most, as share of its own (fitted to path-traced heaps).
-const float GATHERED = 1.2;
+const float GATHERED = 1.8;
 
 // tau: optical depths of the other particles in front of the pole facing the sun, the centre and the far pole; own: of
 // this one, from pole to pole; xi: `clouds.xi`.
@@ -28,8 +28,10 @@ SunShares sun_shares(vec3 tau, float own, float xi, uint transfer) {
         return SunShares(share, share);
     }
     float crowd = 1.0 + max(tau.z - tau.x, 0.0) / max(own, 1e-3);
-    float gathered = 1.0 + GATHERED * (1.0 - 1.0 / crowd);
-    vec3 shared_by = vec3(crowd, crowd, sqrt(crowd));
+    float others = 1.0 - 1.0 / crowd;
+    float gathered = 1.0 + GATHERED * others * others;
+    float root = sqrt(crowd);
+    vec3 shared_by = vec3(crowd * root, crowd, root);
     return SunShares(gathered / (1.0 + xi * tau / shared_by), exp(-tau));
 }
 

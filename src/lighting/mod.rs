@@ -21,7 +21,7 @@ use crate::tiling::Tiling;
 
 /// Light that a particle in a crowd gets from its neighbours, at most, as share of its own
 /// (`glsl/lighting/transfer.glsl`).
-pub const GATHERED: f32 = 1.2;
+pub const GATHERED: f32 = 1.8;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

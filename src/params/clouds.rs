@@ -121,7 +121,7 @@ impl Transfer {
     #[must_use]
     pub fn xi(self) -> f32 {
         match self {
-            Self::Diffusion => 0.15,
+            Self::Diffusion => 0.2,
             Self::Exponential => 0.05,
         }
     }

@@ -149,7 +149,7 @@ mod tests {
             p.clouds.source = Source::Particles(vec![ParticleDesc::default()]);
         });
         assert_eq!(flat_particles, "nothing");
-        assert!(blamed(|p| p.quality.blend = Blend::Tiled).starts_with("unsupported quality.blend = \"tiled\""));
+        assert!(blamed(|p| p.quality.blend = Blend::Impostor).starts_with("unsupported quality.blend = \"impostor\""));
         assert_eq!(blamed(|p| p.quality.blend = Blend::Interlock(4)), "nothing");
     }
 

@@ -52,8 +52,8 @@ pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, transfer: Transfer) -> ([f64
         Transfer::Exponential => (tau.map(|tau| (-xi * tau).exp()), tau.map(|tau| (-xi * tau).exp())),
         Transfer::Diffusion => {
             let crowd = 1.0 + (tau[2] - tau[0]).max(0.0) / own.max(1e-3);
-            let gathered = 1.0 + f64::from(GATHERED) * (1.0 - 1.0 / crowd);
-            let shared_by = [crowd, crowd, crowd.sqrt()];
+            let gathered = 1.0 + f64::from(GATHERED) * (1.0 - 1.0 / crowd).powi(2);
+            let shared_by = [crowd.powf(1.5), crowd, crowd.sqrt()];
             (std::array::from_fn(|i| gathered / (1.0 + xi * tau[i] / shared_by[i])), tau.map(|tau| (-tau).exp()))
         }
     }
