@@ -120,6 +120,26 @@ fn a_picture_its_transmittance_and_its_statistics() {
     );
 }
 
+/// Every test starts commands under validation. That a message is seen shows where the layer is told to give advice too.
+#[test]
+fn a_message_of_the_validation_layer_is_an_error() {
+    let directory = directory(FLAT);
+    for line in [
+        "bench sky.toml --size 8x8 --blend alpha --measure 1 --warmup 0",
+        "ab sky.toml --a alpha --b alpha --reference list --size 8x8 --out out",
+        "reference sky.toml -o a.exr --size 8x8 --spp 1",
+    ] {
+        let mut command = welkin();
+        command.args(line.split_whitespace()).current_dir(directory.path());
+        let output =
+            command.env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT").output().unwrap();
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+        assert!(message.contains("welkin: validation: "), "{line}: {message}");
+        assert!(message.contains("expected no message from the validation layer"), "{line}: {message}");
+    }
+}
+
 #[test]
 fn a_sequence_is_numbered_and_moves() {
     let directory = directory(FLAT);

@@ -5,12 +5,13 @@ use std::fmt::Write;
 use serde::Serialize;
 use welkin::Result;
 use welkin::frame::{Output, OutputKind};
-use welkin::gpu::standalone::{self, Options, Standalone};
+use welkin::gpu::standalone;
 use welkin::gpu::{Capabilities, Feature};
 use welkin::params::{BLENDS, Blend, Params, WINDOWS};
 use welkin::renderer::Renderer;
 
 use super::args::DevicesArgs;
+use super::validation;
 
 #[derive(Serialize)]
 struct Report {
@@ -69,7 +70,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
 
 /// Every pipeline of a frame of the default scene, on the device that `render` takes by default.
 fn pipelines() -> Result<Vec<String>> {
-    let device = Standalone::new(Options::default())?;
+    let device = validation::open(None, false)?;
     let _renderer = Renderer::new(device.gpu(), &Params::default(), [64, 64], 1)?;
     let _output = Output::new(device.gpu(), OutputKind::Picture, ash::vk::Format::B8G8R8A8_UNORM)?;
     Ok(device.gpu().described_pipelines())

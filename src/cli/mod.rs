@@ -15,6 +15,7 @@ mod scenes;
 mod session;
 mod summary;
 mod tables;
+mod validation;
 mod voxelize;
 
 use std::io::Write;
@@ -38,7 +39,8 @@ pub fn main() -> ExitCode {
         Command::Accuracy(args) => accuracy::run(args).map(|()| true),
         Command::Conform(args) => conform::run(args),
     };
-    match outcome {
+    let validation = validation::verdict();
+    match outcome.and_then(|passed| validation.map(|()| passed)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use welkin::blend::supports;
-use welkin::gpu::standalone::{Options, Standalone, validation_available};
+use welkin::gpu::standalone::Standalone;
 use welkin::gpu::{Buffer, BufferKind, Frames, Image, ImageDesc};
 use welkin::output::{BlendStats, CapacityStats, DeviceStats, ParticleStats, PassStats, Picture, TableStats};
 use welkin::params::{Blend, Lighting, Params, Precision, Style};
@@ -12,9 +12,9 @@ use welkin::renderer::{ListUse, Renderer, TableImages};
 use welkin::{Error, Result};
 
 use super::args::{PictureArgs, SceneArgs, Size};
-use super::places;
 use super::progress::note;
 use super::tables::TableSet;
+use super::{places, validation};
 
 /// The device in use.
 pub struct Device(Standalone);
@@ -22,11 +22,7 @@ pub struct Device(Standalone);
 impl Device {
     /// Opens the device that the flags name. With `validate`, validation is on where its layer is installed.
     pub fn open(args: &SceneArgs, validate: bool) -> Result<Self> {
-        let validation = validate && validation_available();
-        if validate && !validation {
-            note("the validation layer is not installed: validation_messages will be null");
-        }
-        Standalone::new(Options { device: args.device.clone(), validation, ..Options::default() }).map(Self)
+        validation::open(args.device.as_deref(), validate).map(Self)
     }
 
     pub fn frames(&mut self) -> &mut Frames {

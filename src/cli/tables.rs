@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use welkin::gpu::Frames;
-use welkin::gpu::standalone::{Options, Standalone};
 use welkin::lut::{Background, Detail, TableParams, Tables};
 use welkin::output::TableStats;
 use welkin::params::{Params, Preset};
@@ -12,6 +11,7 @@ use welkin::{Error, Result};
 
 use super::args::TablesArg;
 use super::progress::{Progress, note};
+use super::validation;
 
 /// The tables that frames are lit from, and better ones that may be in the making.
 pub struct TableSet {
@@ -81,7 +81,7 @@ fn stats(tables: &Tables) -> TableStats {
 fn beside(params: TableParams, cache: &Path, device: Option<&str>) -> Result<Background> {
     let (cache, device) = (cache.to_owned(), device.map(str::to_owned));
     Background::start(move |progress| {
-        let mut standalone = Standalone::new(Options { device, ..Options::default() })?;
+        let mut standalone = validation::open(device.as_deref(), false)?;
         let frames = standalone.frames();
         Tables::load_or_build(frames, &params, Some(&cache), progress)?.map(|made| made.download(frames)).transpose()
     })

@@ -43,11 +43,11 @@ pub fn drivers() -> Vec<Driver> {
     drivers
 }
 
-/// `welkin` on the driver that this test itself runs on.
+/// `welkin` on the driver that this test itself runs on, under validation: a single message makes it fail.
 pub fn welkin() -> Command {
     // The program that runs on a driver's own libc cannot start another one directly: the runner does.
     let mut command = Command::new(root().join("scripts/runner"));
-    command.arg(env!("CARGO_BIN_EXE_welkin")).current_dir(root());
+    command.arg(env!("CARGO_BIN_EXE_welkin")).current_dir(root()).env("WELKIN_VALIDATION", "1");
     command
 }
 
