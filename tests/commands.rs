@@ -1,9 +1,9 @@
 //! What the commands make: pictures, sequences, statistics, measurements, tables.
 mod support;
 
-use std::path::Path;
 use std::process::Output;
-use support::{stderr, stdout, welkin};
+use support::folder::{command, directory, files, json, npy, run};
+use support::{stderr, stdout};
 
 /// A scene that needs no tables: one ellipsoid of its own colour before black.
 const FLAT: &str = r#"
@@ -25,35 +25,6 @@ const FLAT: &str = r#"
     [animation]
     velocity = [0, 0, -20]
 "#;
-
-/// A directory of its own for a test, with `sky.toml` in it.
-fn directory(scene: &str) -> tempfile::TempDir {
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("sky.toml"), scene).unwrap();
-    directory
-}
-
-/// Runs `welkin` with the words of `line` in `directory`, where it also keeps its tables; it must succeed.
-fn run(directory: &Path, line: &str) -> Output {
-    let mut command = welkin();
-    command.args(line.split_whitespace()).current_dir(directory).env("WELKIN_CACHE", directory.join("cache"));
-    let output = command.output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{line}: {}", stderr(&output));
-    output
-}
-
-/// Names in `directory` other than the scene's.
-fn files(directory: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(directory).unwrap();
-    let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.retain(|name| name != "sky.toml");
-    names.sort();
-    names
-}
-
-fn json(path: &Path) -> serde_json::Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
-}
 
 #[test]
 fn devices_says_why_a_mode_cannot_be_used() {
@@ -99,10 +70,8 @@ fn a_picture_its_transmittance_and_its_statistics() {
     assert!(middle.iter().zip([1.0, 0.5, 0.25]).all(|(v, c)| (v - c).abs() < bound), "{middle:?}");
     assert_eq!(picture.get_pixel(0, 0).0, [0.0; 3]);
 
-    let bytes = std::fs::read(path("a.transmittance.npy")).unwrap();
-    let transmittance = npyz::NpyFile::new(&bytes[..]).unwrap();
-    assert_eq!(transmittance.shape(), [30, 40]);
-    let transmittance = transmittance.into_vec::<f32>().unwrap();
+    let (shape, transmittance) = npy(&path("a.transmittance.npy"));
+    assert_eq!(shape, [30, 40]);
     assert_eq!(transmittance[0], 1.0);
     assert!(transmittance[15 * 40 + 20] < 1e-3);
 
@@ -129,10 +98,9 @@ fn a_message_of_the_validation_layer_is_an_error() {
         "ab sky.toml --a alpha --b alpha --reference list --size 8x8 --out out",
         "reference sky.toml -o a.exr --size 8x8 --spp 1",
     ] {
-        let mut command = welkin();
-        command.args(line.split_whitespace()).current_dir(directory.path());
-        let output =
-            command.env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT").output().unwrap();
+        let mut command = command(directory.path(), line);
+        command.env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT");
+        let output = command.output().unwrap();
         let message = stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{line}: {message}");
         assert!(message.contains("welkin: validation: "), "{line}: {message}");
@@ -187,10 +155,8 @@ fn tables_are_made_once_read_from_the_cache_and_made_anew_when_damaged() {
     assert_eq!(files(&out), ["first_matter.npy", "multiple.npy", "optical_depth.npy", "single.npy", "tables.json"]);
     let index = json(&out.join("tables.json"));
     for table in index["tables"].as_array().unwrap() {
-        let bytes = std::fs::read(out.join(table["file"].as_str().unwrap())).unwrap();
-        let file = npyz::NpyFile::new(&bytes[..]).unwrap();
-        assert_eq!(serde_json::json!(file.shape()), table["shape"]);
-        let values = file.into_vec::<f32>().unwrap();
+        let (shape, values) = npy(&out.join(table["file"].as_str().unwrap()));
+        assert_eq!(serde_json::json!(shape), table["shape"]);
         assert!(
             values.iter().all(|&v| (0.0..=10.0).contains(&v)),
             "mean densities and source functions are of order 1"

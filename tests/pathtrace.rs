@@ -420,7 +420,7 @@ fn the_same_seed_gives_the_same_bits_however_it_is_split_and_resumed() {
     assert!(broken.is_break() && first.samples() == 4, "what is broken off leaves whole passes");
     let bytes = first.state().to_bytes();
     let mut second = PathTracer::new(device.frames(), &params, [20, 12], &options).unwrap();
-    second.restore(State::from_bytes("state", &bytes).unwrap()).unwrap();
+    second.restore(State::from_bytes(&bytes).unwrap()).unwrap();
     gather(&mut device, &mut second, 9);
     assert!(second.state() == at_once);
 

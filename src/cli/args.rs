@@ -8,7 +8,7 @@ use welkin::params::Blend;
 
 /// Cumulus skies in Vulkan: a scene file goes in, a picture comes out.
 ///
-/// Exit status: 0 done, 1 a comparison or check failed, 2 error.
+/// Exit status: 0 done, 1 a comparison or check failed, 2 error, 130 stopped by Ctrl-C, 143 by SIGTERM.
 #[derive(Parser, Debug)]
 #[command(name = "welkin", version, max_term_width = 120)]
 pub struct Cli {
@@ -211,8 +211,8 @@ pub struct ReferenceArgs {
     #[arg(long)]
     pub antialias: bool,
     /// Go on from a state [default: OUT.state]
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "")]
-    pub resume: Option<PathBuf>,
+    #[arg(long, value_name = "FILE")]
+    pub resume: Option<Option<PathBuf>>,
     /// Write the clouds' transmittance beside the picture, as OUT.transmittance.npy
     #[arg(long)]
     pub aux: bool,

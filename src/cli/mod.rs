@@ -6,6 +6,7 @@ mod args;
 mod bench;
 mod conform;
 mod devices;
+mod interrupt;
 mod places;
 mod precompute;
 mod progress;
@@ -25,24 +26,45 @@ use args::{Cli, Command};
 use clap::Parser;
 use welkin::{Error, Result};
 
-/// Parses the command line and runs it. Status 0: done; 1: a comparison or check failed; 2: error.
+/// How a command ended, if not by an error.
+enum Outcome {
+    Done,
+    /// A comparison or check failed.
+    Failed,
+    /// It was asked to end before it was done.
+    Stopped(interrupt::Signal),
+}
+
+impl Outcome {
+    fn done((): ()) -> Self {
+        Self::Done
+    }
+
+    fn of(passed: bool) -> Self {
+        if passed { Self::Done } else { Self::Failed }
+    }
+}
+
+/// Parses the command line and runs it. Status 0: done; 1: a comparison or check failed; 2: error; 128 and the number of a
+/// signal that has ended it.
 pub fn main() -> ExitCode {
     let cli = Cli::parse(); // Ends the process with status 2 on a usage error, 0 on --help.
     let outcome = match &cli.command {
-        Command::Devices(args) => devices::run(args).map(|()| true),
-        Command::Render(args) => render::run(args).map(|()| true),
-        Command::Precompute(args) => precompute::run(args).map(|()| true),
-        Command::Voxelize(args) => voxelize::run(args).map(|()| true),
-        Command::Reference(args) => reference::run(args).map(|()| true),
-        Command::Bench(args) => bench::run(args).map(|()| true),
-        Command::Ab(args) => ab::run(args),
-        Command::Accuracy(args) => accuracy::run(args).map(|()| true),
-        Command::Conform(args) => conform::run(args),
+        Command::Devices(args) => devices::run(args).map(Outcome::done),
+        Command::Render(args) => render::run(args).map(Outcome::done),
+        Command::Precompute(args) => precompute::run(args),
+        Command::Voxelize(args) => voxelize::run(args),
+        Command::Reference(args) => reference::run(args),
+        Command::Bench(args) => bench::run(args).map(Outcome::done),
+        Command::Ab(args) => ab::run(args).map(Outcome::of),
+        Command::Accuracy(args) => accuracy::run(args).map(Outcome::done),
+        Command::Conform(args) => conform::run(args).map(Outcome::of),
     };
     let validation = validation::verdict();
-    match outcome.and_then(|passed| validation.map(|()| passed)) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+    match outcome.and_then(|outcome| validation.map(|()| outcome)) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Failed) => ExitCode::from(1),
+        Ok(Outcome::Stopped(signal)) => ExitCode::from(signal.status()),
         Err(error) => {
             eprintln!("welkin: error: {error}");
             ExitCode::from(2)

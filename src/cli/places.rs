@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use welkin::output::Format;
+use welkin::output::{AtomicFile, Format};
 use welkin::{Error, Result};
 
 /// The picture file of each scene. Everything that can be wrong with them is found before the first frame.
@@ -14,7 +14,7 @@ pub fn pictures(scenes: &[PathBuf], output: Option<&Path>) -> Result<Vec<PathBuf
         && !is_directory(file)
     {
         Format::of(file)?;
-        in_directory(file)?;
+        writable(file)?;
         return Ok(vec![file.to_owned()]);
     }
     let directory = output.unwrap_or(Path::new(""));
@@ -46,14 +46,9 @@ pub fn directory(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path).map_err(|error| Error::file(path, format!("cannot be made: {error}")))
 }
 
-/// The directory that `file` is to be written in is there.
-pub fn in_directory(file: &Path) -> Result<()> {
-    match file.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-        Some(directory) if !directory.is_dir() => {
-            Err(Error::file(file, format!("cannot be written: there is no directory {}", directory.display())))
-        }
-        _ => Ok(()),
-    }
+/// `file` can be written, which is found by starting it and leaving it: hours of work may come before it is.
+pub fn writable(file: &Path) -> Result<()> {
+    AtomicFile::create(file).map(drop)
 }
 
 /// The directory for tables: what was asked for, `$WELKIN_CACHE`, or `welkin` in the user's cache directory.

@@ -7,9 +7,10 @@ use welkin::output::{Axis, AxisValues, Table, write_tables};
 use welkin::params::{Clouds, PHASES, STYLES};
 
 use super::args::PrecomputeArgs;
+use super::interrupt::Interrupt;
 use super::progress::note;
 use super::session::Device;
-use super::{places, scenes, tables};
+use super::{Outcome, places, scenes, tables};
 
 /// The medium that the tables belong to, as a scene file writes it.
 #[derive(Serialize)]
@@ -46,17 +47,25 @@ impl Medium {
     }
 }
 
-pub fn run(args: &PrecomputeArgs) -> Result<()> {
+pub fn run(args: &PrecomputeArgs) -> Result<Outcome> {
+    let interrupt = Interrupt::watch()?;
     let params = scenes::load_medium(args.scene.as_deref(), &args.args)?;
     let mut device = Device::open(&args.args, false)?;
     let frames = device.frames();
     let detail = if args.reduced { Detail::Coarse } else { Detail::Full };
     let wanted = TableParams::new(&params.clouds, detail);
-    let made = tables::make(frames, &wanted, &places::cache(args.args.cache.as_deref())?)?;
+    let cache = places::cache(args.args.cache.as_deref())?;
+    let made = tables::make(frames, &wanted, &cache, &|| interrupt.signal().is_some())?;
+    let Some(made) = made else {
+        note(
+            "stopped: no table is written; the cache keeps those that were finished, and the next run makes the others",
+        );
+        return Ok(interrupt.signal().map_or(Outcome::Failed, Outcome::Stopped));
+    };
     let files: Vec<Table> = made.export(frames)?.into_iter().map(table).collect();
     write_tables(&args.out, &Medium::new(&params.clouds, &made.energy()), &files)?;
     note(&format!("wrote {}", args.out.join("tables.json").display()));
-    Ok(())
+    Ok(Outcome::Done)
 }
 
 fn table(from: ExportTable) -> Table {

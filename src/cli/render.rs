@@ -12,6 +12,9 @@ use super::session::{Device, Session};
 use super::summary::{PassTimes, median};
 use super::{places, scenes};
 
+/// What `--stats` takes for standard output.
+const TO_STDOUT: &str = "-";
+
 /// A scene that has been found good, and where its pictures go.
 struct Job<'a> {
     scene: &'a Path,
@@ -21,7 +24,7 @@ struct Job<'a> {
 
 pub fn run(args: &RenderArgs) -> Result<()> {
     let outputs = places::pictures(&args.scenes, args.output.as_deref())?;
-    args.stats.as_deref().map_or(Ok(()), places::in_directory)?;
+    args.stats.as_deref().filter(|file| *file != TO_STDOUT).map_or(Ok(()), places::writable)?;
     let jobs = args
         .scenes
         .iter()
@@ -37,7 +40,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         reports.push(render(args, job, &mut device)?);
     }
     let Some(file) = &args.stats else { return Ok(()) };
-    let to_stdout = file.as_os_str() == "-";
+    let to_stdout = file == TO_STDOUT;
     match (&reports[..], to_stdout) {
         ([one], true) => super::print_json(one),
         ([one], false) => write_json(file, one),

@@ -42,7 +42,8 @@ impl TableSet {
             }
             TablesArg::Progressive => Detail::Coarse,
         };
-        let tables = make(frames, &TableParams::new(&params.clouds, detail), cache)?;
+        let tables = make(frames, &TableParams::new(&params.clouds, detail), cache, &|| false)?;
+        let tables = tables.ok_or_else(|| Error::file(cache, "the tables were not made"))?;
         let better = match (wanted, detail) {
             (TablesArg::Progressive, Detail::Coarse) => Some(beside(full, cache, device)?),
             _ => None,
@@ -87,19 +88,22 @@ fn beside(params: TableParams, cache: &Path, device: Option<&str>) -> Result<Bac
     })
 }
 
-/// Reads the tables from the cache, or builds them with a bar.
-pub fn make(frames: &mut Frames, params: &TableParams, cache: &Path) -> Result<Tables> {
+/// Reads the tables from the cache, or builds them with a bar; none if `stop` came true before.
+pub fn make(
+    frames: &mut Frames,
+    params: &TableParams,
+    cache: &Path,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Tables>> {
     const STEPS: f32 = 1000.0;
     let mut bar = None;
     let tables = Tables::load_or_build(frames, params, Some(cache), &mut |progress| {
         let bar = bar.get_or_insert_with(|| Progress::start("tables", STEPS as u64));
         bar.set((progress.fraction * STEPS) as u64);
-        ControlFlow::Continue(())
+        if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     drop(bar);
-    // Only a break of the progress function ends without tables, and it makes none.
-    let tables = tables.ok_or_else(|| Error::file(cache, "the tables were not made"))?;
-    report(&tables);
+    tables.iter().for_each(report);
     Ok(tables)
 }
 

@@ -10,9 +10,10 @@ use welkin::voxelize::{Brick, Gathered, Order, VoxelGrid, Voxelizer};
 use welkin::{Error, Result};
 
 use super::args::{Bounds, VoxelizeArgs};
+use super::interrupt::Interrupt;
 use super::progress::{Progress, note};
 use super::session::Device;
-use super::{places, scenes};
+use super::{Outcome, places, scenes};
 
 /// How far around the camera the grid of particles is taken without `--bounds` [m].
 const REACH: f64 = 5000.0;
@@ -79,9 +80,11 @@ struct Sums {
     total: f64,
 }
 
-pub fn run(args: &VoxelizeArgs) -> Result<()> {
+pub fn run(args: &VoxelizeArgs) -> Result<Outcome> {
     let vdb = is_vdb(&args.output)?;
-    places::in_directory(&args.output)?;
+    let side_file = args.output.with_extension("json");
+    [&args.output, &side_file].into_iter().try_for_each(|file| places::writable(file))?;
+    let interrupt = Interrupt::watch()?;
     let params = scenes::load_with_quality(&args.scene, args.quality, &args.args)?;
     let mut device = Device::open(&args.args, false)?;
     let frames = device.frames();
@@ -107,10 +110,14 @@ pub fn run(args: &VoxelizeArgs) -> Result<()> {
     };
     let mut on_progress = |done| {
         progress.set((done * STEPS) as u64);
-        ControlFlow::Continue(())
+        interrupt.signal().map_or(ControlFlow::Continue(()), |_| ControlFlow::Break(()))
     };
-    voxelizer.run(frames, &grid, order, &mut sink, &mut on_progress)?;
+    let whole = voxelizer.run(frames, &grid, order, &mut sink, &mut on_progress)?;
     drop(progress);
+    if let (false, Some(signal)) = (whole, interrupt.signal()) {
+        note(&format!("stopped by {signal}: nothing is written"));
+        return Ok(Outcome::Stopped(signal));
+    }
     let side = sidecar(args, &params, &grid, &sums);
     match volume {
         Volume::Npy(volume) => volume.finish()?,
@@ -121,7 +128,7 @@ pub fn run(args: &VoxelizeArgs) -> Result<()> {
             notes: vec![("quantity".into(), side.quantity.into()), ("unit".into(), side.unit.into())],
         })?,
     }
-    write_json(&args.output.with_extension("json"), &side)?;
+    write_json(&side_file, &side)?;
     let [x, y, z] = grid.size;
     let share = 100.0 * sums.active as f64 / grid.voxels() as f64;
     note(&format!(
@@ -130,7 +137,7 @@ pub fn run(args: &VoxelizeArgs) -> Result<()> {
         grid.voxel,
         sums.maximum
     ));
-    Ok(())
+    Ok(Outcome::Done)
 }
 
 /// Whether the extension of `path` names OpenVDB; otherwise it is NumPy.

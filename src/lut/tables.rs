@@ -168,7 +168,7 @@ impl Tables {
     /// Reads the tables from `cache`, or builds them and writes them there; without a cache directory they are built.
     ///
     /// A damaged or unwritable cache is no error: it leads to a warning, see [`Self::warnings`]. `progress` may stop the
-    /// build by returning `Break`; the answer is then `None` and the cache is as it was before.
+    /// build by returning `Break`; the answer is then `None`, and the cache has gained nothing or one whole table.
     pub fn load_or_build(
         frames: &mut Frames,
         params: &TableParams,

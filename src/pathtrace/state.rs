@@ -63,9 +63,12 @@ impl State {
     /// Reads what [`Self::to_bytes`] made.
     ///
     /// # Errors
-    /// [`Error::InvalidParam`] for anything else; `name` is what the error calls it.
-    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self> {
-        let bad = |found: &str| Error::invalid("--resume", name, format!("a state of welkin reference ({found})"));
+    /// [`Error::InvalidParam`] for anything else.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let bad = |found: &str| {
+            let value = format!("{} bytes", bytes.len());
+            Error::invalid("state", value, format!("a state of welkin reference ({found})"))
+        };
         if bytes.len() < HEADER || &bytes[..MAGIC.len()] != MAGIC {
             return Err(bad("it is not one of this version"));
         }
@@ -90,14 +93,14 @@ mod tests {
         let pixel = |i: usize| PixelSums { radiance: [i as f32, 0.5, 2.0], distance: 7.0, ..PixelSums::default() };
         let state = State { fingerprint: [9; 32], samples: 3, pixels: (0..5).map(pixel).collect() };
         let bytes = state.to_bytes();
-        assert_eq!(State::from_bytes("a", &bytes).unwrap(), state);
+        assert_eq!(State::from_bytes(&bytes).unwrap(), state);
         let mut damaged = bytes.clone();
         damaged[HEADER + 3] ^= 1;
         for (bytes, word) in
             [(&damaged[..], "checksum"), (&bytes[..50], "not one"), (&bytes[..HEADER + 70], "checksum")]
         {
-            let message = State::from_bytes("a.state", bytes).unwrap_err().to_string();
-            assert!(message.starts_with("--resume = a.state") && message.contains(word), "{message}");
+            let message = State::from_bytes(bytes).unwrap_err().to_string();
+            assert!(message.starts_with("state = ") && message.contains(word), "{message}");
         }
     }
 }

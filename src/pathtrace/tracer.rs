@@ -294,7 +294,7 @@ impl PathTracer {
     pub fn restore(&mut self, state: State) -> Result<()> {
         if state.fingerprint != self.fingerprint || state.pixels.len() != self.pixels.len() {
             let expected = "the state of this scene at this size, with this seed, from this version";
-            return Err(Error::invalid("--resume", "a state", expected));
+            return Err(Error::invalid("state", "of another picture", expected));
         }
         (self.samples, self.pixels) = (state.samples, state.pixels);
         Ok(())

@@ -144,7 +144,7 @@ impl Voxelizer {
             let binned = region.bin(&self.gathered, grid);
             let mut at = 0;
             while at < binned.bricks.len() {
-                let next = batch_end(&binned, at);
+                let next = batch_end(&binned, at, self.push.samples);
                 self.batch(frames, grid, &binned, at..next, sink)?;
                 at = next;
                 if progress((done + weight * at as f64 / binned.bricks.len() as f64) / total).is_break() {
@@ -222,10 +222,11 @@ fn crop(brick: &VoxelBrick, sigma_t: &mut [f32], grid: &VoxelGrid) {
     }
 }
 
-/// End of the batch that starts at brick `at`: at least one brick.
-fn batch_end(binned: &Binned, at: usize) -> usize {
+/// End of the batch that starts at brick `at`: at least one brick, and no more work than 3³ samples in all of them are.
+fn batch_end(binned: &Binned, at: usize, samples: u32) -> usize {
     let mut entries = 0;
-    let fits = binned.bricks[at..].iter().take(BATCH).take_while(|brick| {
+    let most = BATCH * 27 / samples.pow(3).max(27) as usize;
+    let fits = binned.bricks[at..].iter().take(most).take_while(|brick| {
         entries += brick.count as usize;
         entries <= BATCH_ENTRIES
     });

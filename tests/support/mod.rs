@@ -1,6 +1,7 @@
 //! What the integration tests share: the drivers that this machine has, and a way to start `welkin` on one of them.
 #![allow(dead_code)] // Each test file uses its own part.
 
+pub mod folder;
 pub mod vdb;
 
 use std::path::{Path, PathBuf};
