@@ -199,9 +199,6 @@ fn a_full_disk_is_an_error_and_leaves_nothing() {
     if !possible.is_ok_and(|output| output.status.success()) {
         return eprintln!("skipped: no mount namespace here; output::write_atomic has a test of its own");
     }
-    let bench = Bench::new(BALL);
-    let disk = bench.path("disk");
-    fs::create_dir(&disk).unwrap();
     let script = r#"
         mount -t tmpfs -o size=16k tmpfs "$0" || exit 99
         "$@"; status=$?
@@ -209,16 +206,28 @@ fn a_full_disk_is_an_error_and_leaves_nothing() {
         exit $status
     "#;
     let runner = root().join("scripts/runner");
-    let out = Path::new(&disk).join("out.npy");
-    let output = Command::new("unshare")
-        .args(["-rm", "sh", "-c", script, &disk])
-        .arg(runner)
-        .args([env!("CARGO_BIN_EXE_welkin"), "render", &bench.path("scene.toml"), "--size", "64x64", "-o"])
-        .arg(out) // 64² pixels of 12 bytes: three times what there is room for
-        .output()
-        .unwrap();
-    bench.assert_refused(&output, &["out.npy", "cannot be written", "space"], &["disk"]);
-    assert_eq!(support::stdout(&output).trim(), "", "left on the full disk");
+    // Each makes more than three times what there is room for.
+    for (line, file) in [
+        ("render --size 64x64 -o", "out.npy"),
+        ("reference --size 64x64 --spp 1 -o", "out.state"),
+        ("voxelize --resolution 32 -o", "out.npy"),
+        ("voxelize --resolution 32 -o", "out.vdb"),
+    ] {
+        let bench = Bench::new(BALL);
+        let disk = bench.path("disk");
+        fs::create_dir(&disk).unwrap();
+        let output = Command::new("unshare")
+            .args(["-rm", "sh", "-c", script, &disk])
+            .arg(&runner)
+            .arg(env!("CARGO_BIN_EXE_welkin"))
+            .args(line.split_whitespace())
+            .arg(Path::new(&disk).join(file).with_extension(if file.ends_with("vdb") { "vdb" } else { "npy" }))
+            .arg(bench.path("scene.toml"))
+            .output()
+            .unwrap();
+        bench.assert_refused(&output, &[file, "cannot be written", "space"], &["disk"]);
+        assert_eq!(support::stdout(&output).trim(), "", "{line}: left on the full disk");
+    }
 }
 
 #[test]
