@@ -3,7 +3,6 @@
 //!
 //! `cargo run --release --example table_convergence -- OUT.svg` (docs/tables.md shows the result).
 
-use std::f64::consts::PI;
 use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -12,48 +11,29 @@ use welkin::gpu::standalone::{Options, Standalone};
 use welkin::lut::axes::{STEPS, ScatteringShape};
 use welkin::lut::{Detail, ScatteringTable, TableParams, read_image};
 use welkin::params::Clouds;
-use welkin::reference::monte_carlo::{Estimate, Medium, multiple_scattering, next_uniform, parallel};
+use welkin::reference::comparison::{Case, Deviation, random_cases};
+use welkin::reference::monte_carlo::Medium;
 use welkin::reference::scattering::ScatteringLookup;
-use welkin::reference::sphere::RayCoordinates;
 
 const RAYS: usize = 200;
-/// Density levels that are shown.
-const SHOWN: [u32; 4] = [1, 3, 5, 7];
+/// Density levels that are shown, and how many walks a ray gets on average there.
+const SHOWN: [(u32, u32); 4] = [(1, 1500), (3, 3000), (5, 4000), (7, 2500)];
 
 /// Rays of one optical radius with what Monte Carlo found there.
 struct Truth {
     optical_radius: f64,
-    rays: Vec<(RayCoordinates, Estimate)>,
+    cases: Vec<Case>,
 }
 
 impl Truth {
-    fn new(medium: &Medium, level: u32) -> Self {
-        let optical_radius = ScatteringShape::optical_radius(level * STEPS);
-        let rays = parallel(RAYS, |i| {
-            let mut state = 7919 * u64::from(level) + i as u64;
-            let mut u = || next_uniform(&mut state);
-            let (theta, psi, mu) = ((1.0 - 2.0 * u()).acos(), PI * u(), u().sqrt().max(1e-4));
-            let c = RayCoordinates { theta, psi, mu };
-            (c, multiple_scattering(medium, &c.ray(), optical_radius, None, 1000, state))
-        });
-        Self { optical_radius, rays }
+    fn new(medium: &Medium, (level, walks): (u32, u32)) -> Self {
+        let r = ScatteringShape::optical_radius(level * STEPS);
+        Self { optical_radius: r, cases: random_cases(medium, r, r, RAYS, walks, 7919 + u64::from(level)) }
     }
 
-    /// Relative RMS error of a table with the noise of the walks taken out [%].
-    fn error(&self, table: &ScatteringLookup) -> f64 {
-        let (mut square, mut energy) = (0.0, 0.0);
-        for (c, truth) in &self.rays {
-            square += (table.multiple(c, self.optical_radius) - truth.mean).powi(2) - truth.error * truth.error;
-            energy += truth.mean * truth.mean;
-        }
-        100.0 * (square.max(0.0) / energy).sqrt()
-    }
-
-    /// RMS error below which nothing can be said, because the noise that is taken out is itself uncertain [%].
-    fn floor(&self) -> f64 {
-        let energy: f64 = self.rays.iter().map(|(_, truth)| truth.mean * truth.mean).sum();
-        let spread: f64 = self.rays.iter().map(|(_, truth)| 2.0 * truth.error.powi(4)).sum();
-        100.0 * (spread.sqrt() / energy).sqrt()
+    fn deviation(&self, table: &ScatteringLookup) -> Deviation {
+        let pairs: Vec<_> = self.cases.iter().map(|c| (table.multiple(&c.ray, c.optical_radius), c.truth)).collect();
+        Deviation::new(&pairs)
     }
 }
 
@@ -70,7 +50,7 @@ struct Run {
     name: String,
     wall: f64,
     cpu: f64,
-    errors: Vec<f64>,
+    found: Vec<Deviation>,
 }
 
 fn run(
@@ -86,9 +66,9 @@ fn run(
     table.build(frames, medium, None, detail, &mut |_| ControlFlow::Continue(()))?;
     let (cpu, wall) = (cpu_seconds(started) - before, started.elapsed().as_secs_f64());
     let lookup = ScatteringLookup::new(shape, read_image(frames, table.image())?);
-    let errors = truths.iter().map(|truth| truth.error(&lookup)).collect();
+    let found = truths.iter().map(|truth| truth.deviation(&lookup)).collect();
     let coarse = if shape == ScatteringShape::FULL { "" } else { " (`Coarse`)" };
-    Ok(Run { name: format!("{detail}{coarse}"), wall, cpu, errors })
+    Ok(Run { name: format!("{detail}{coarse}"), wall, cpu, found })
 }
 
 /// Both axes logarithmic: CPU seconds to the right, RMS error in per cent upwards.
@@ -123,7 +103,8 @@ fn plot(runs: &[Run], truths: &[Truth]) -> String {
     for (k, truth) in truths.iter().enumerate() {
         let colour = COLOURS[k % COLOURS.len()];
         let full: Vec<&Run> = runs.iter().filter(|run| !run.name.contains("Coarse")).collect();
-        let points: Vec<String> = full.iter().map(|run| format!("{:.1},{:.1}", x(run.cpu), y(run.errors[k]))).collect();
+        let points: Vec<String> =
+            full.iter().map(|run| format!("{:.1},{:.1}", x(run.cpu), y(100.0 * run.found[k].rms()))).collect();
         let _ = writeln!(
             svg,
             "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>",
@@ -132,7 +113,7 @@ fn plot(runs: &[Run], truths: &[Truth]) -> String {
         for run in runs {
             let coarse = run.name.contains("Coarse");
             let (radius, fill) = if coarse { (5, "none") } else { (3, colour) };
-            let (cx, cy) = (x(run.cpu), y(run.errors[k]));
+            let (cx, cy) = (x(run.cpu), y(100.0 * run.found[k].rms()));
             let _ = writeln!(
                 svg,
                 "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"{colour}\"/>"
@@ -161,11 +142,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!("|---|---|---|{}", "---|".repeat(truths.len()));
     for run in &runs {
-        let errors: Vec<String> = run.errors.iter().map(|error| format!("{error:.1} %")).collect();
+        let errors: Vec<String> =
+            (run.found.iter()).map(|d| format!("{:.1} % (< {:.1})", 100.0 * d.rms(), 100.0 * d.rms_bound())).collect();
         println!("| {} | {:.1} s | {:.1} s | {} |", run.name, run.wall, run.cpu, errors.join(" | "));
     }
-    let floors = truths.each_ref().map(|truth| format!("{:.1} %", truth.floor()));
-    println!("| noise left | | | {} |", floors.join(" | "));
     std::fs::write(out, plot(&runs, &truths))?;
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 pub mod atmosphere;
 pub mod compact;
+pub mod comparison;
 pub mod density;
 pub mod detail;
 pub mod extinction;
