@@ -51,9 +51,14 @@ void main() {
     for (uint first = 0u; first <= last; first += BLOCK) {
         vec2 c[BLOCK];
         for (uint i = 0u; i < BLOCK; ++i) c[i] = vec2(0.0);
-        for (uint m = 0u; m <= m_max; ++m) {
-            vec2 part = (m & 1u) == 0u ? vec2(a[m], 0.0) : vec2(0.0, a[m]);
-            for (uint i = 0u; i < BLOCK; ++i) c[i] += rotations.at[job.rotation + min(first + i, last) * width + m] * part;
+        // Even orders meet the cosines, odd ones the sines.
+        for (uint m = 0u; m <= m_max; m += 2u) {
+            float even = a[m];
+            for (uint i = 0u; i < BLOCK; ++i) c[i].x += rotations.at[job.rotation + min(first + i, last) * width + m] * even;
+        }
+        for (uint m = 1u; m <= m_max; m += 2u) {
+            float odd = a[m];
+            for (uint i = 0u; i < BLOCK; ++i) c[i].y += rotations.at[job.rotation + min(first + i, last) * width + m] * odd;
         }
         for (uint i = 0u; i < BLOCK; ++i) {
             if (first + i > last) break;
