@@ -71,6 +71,6 @@ void main() {
 
     float n_mu = float(size.z) / SCATTERING_LEVELS;
     ivec3 at = ivec3(texel, int(level * uint(n_mu) + view));
-    float multiple = max(radiance, 0.0) / opacity - multiple_scattering_model(entry, to_sun, optical_radius);
+    float multiple = max(radiance, 0.0) / (opacity * multiple_scattering_model(entry, dir, to_sun, mu, optical_radius));
     imageStore(table, at, vec4(rest, multiple, 0.0, 0.0));
 }

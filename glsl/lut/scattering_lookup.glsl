@@ -5,15 +5,15 @@
 // the compositing stages): it stays finite and smooth where the chord shrinks to nothing, and a look-up multiplies back.
 // Single scattering varies faster than 32 x 64 x 16 texels can tell (its edge of shadow is 1/R wide), so the table holds
 // what `single_scattering_model`, three closed-form steps along the ray, leaves over; interpolated, the sum is within
-// 1.6 % RMS of the quadrature for random rays at any optical radius (docs/tables.md). Multiple scattering has a smaller
-// such model, of its bend at the terminator.
+// 1.6 % RMS of the quadrature for random rays at any optical radius (docs/tables.md). Multiple scattering is stored as a
+// multiple of a model of its own.
 //
 // A ray is described as the eye sees it, because the functions are smooth in these coordinates and the forward peak then
 // lies along one axis:
 //   Theta  scattering angle, cos Theta = -dot(to_sun, to_eye), 0 = looking into the sun, [0, π], dense at 0 (∝ t²);
 //   psi    azimuth, about the ray, between the side of the sphere on which the ray runs and the sun, [0, π] by symmetry;
 //   mu     cosine of the zenith angle of the ray at its entry point; the chord is 2 mu radii, b = sqrt(1 - mu²) is the
-//          impact parameter. Below mu = 0.6 placed by the chord's optical depth, evenly to 3 and geometrically beyond,
+//          impact parameter. Below mu = 0.75 placed by the chord's optical depth, evenly to 20 and geometrically beyond,
 //          so that grazing rays of thick spheres are resolved; above evenly in b;
 //   R      optical radius sigma_t · density · radius, evenly in log2.
 // Layout of the 3D image: x = Theta, y = psi, z = level · N_mu + mu; domain ends on texel centres.
@@ -26,8 +26,8 @@
 const float SCATTERING_LEVELS = 29.0;
 const float SCATTERING_R_MIN = 0.4;     // optical radius of level 0
 const float SCATTERING_R_MAX = 102.4;   // optical radius of the last level
-const float SCATTERING_MU_SCALE = 3.0;  // optical depth up to which chords are spaced evenly (tuned)
-const float SCATTERING_MU_SPLIT = 0.6;  // mu where even impact parameters begin, and the share of the axis below it
+const float SCATTERING_MU_SCALE = 20.0; // optical depth up to which chords are spaced evenly (tuned)
+const float SCATTERING_MU_SPLIT = 0.75; // mu where even impact parameters begin, and the share of the axis below it
 
 // (Theta, psi, mu) of a ray.
 vec3 scattering_coordinates(vec3 entry_us, vec3 dir_us, vec3 to_sun_us) {
@@ -79,20 +79,24 @@ float single_scattering_model(vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float 
     return sum / scattering_opacity(tau);
 }
 
-// The bend of multiple scattering at the terminator of thick spheres, which texels alone would blunt [1/sr]. It is only
-// there to be subtracted before and added after interpolation, so its size needs to be right only roughly (tuned).
-float multiple_scattering_model(vec3 entry_us, vec3 to_sun_us, float optical_radius) {
-    float cos_sun = dot(entry_us, to_sun_us), width = 2.0 / optical_radius;
-    return 0.225 * optical_radius / (optical_radius + 15.0) * (cos_sun + sqrt(cos_sun * cos_sun + width * width));
+// What the mean source function of multiple scattering is nearly proportional to: c / (c + mu), which light scattered once
+// by a thick layer shows for sunlight falling in at cosine c, with the terminator blunted over an optical depth of 4 and a
+// peak forward (Henyey–Greenstein's, g = 0.5). The table holds the quotient, which texels can follow through the crescent
+// of a thick sphere seen against the sun. The albedo scales both alike. (All numbers tuned: least interpolation error.)
+float multiple_scattering_model(vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float mu, float optical_radius) {
+    float cos_sun = dot(entry_us, to_sun_us), width = 4.0 / optical_radius;
+    float lit = cos_sun + sqrt(cos_sun * cos_sun + width * width);
+    float peak = inversesqrt(1.25 - dot(dir_us, to_sun_us));
+    return 0.05 + lit / (lit + 2.0 * mu + 0.05) * 0.75 * peak * peak * peak;
 }
 
-// What the table holds at one level: the rests of single [1] and of multiple scattering [1/sr] over their models.
+// What the table holds at one level: single scattering less its model [1], multiple scattering over its model [1/sr].
 vec2 scattering_level_fetch(sampler3D lut, vec3 coordinates, float optical_radius, float level, vec3 size) {
     float n_mu = size.z / SCATTERING_LEVELS;
     float full = 2.0 * SCATTERING_MU_SPLIT / SCATTERING_MU_SCALE * optical_radius, mu = coordinates.z;
     float t_mu = mu <= SCATTERING_MU_SPLIT
         ? SCATTERING_MU_SPLIT * asinh(full / SCATTERING_MU_SPLIT * mu) / asinh(full)
-        : 1.0 - 0.5 * sqrt(max(1.0 - mu * mu, 0.0));         // b = 0.8 at the split: 0.4 / 0.8
+        : 1.0 - 0.3779644730092272 * sqrt(max(1.0 - mu * mu, 0.0)); // 0.25 / b at the split
     vec3 t = vec3(sqrt(coordinates.x * 0.3183098861837907), coordinates.y * 0.3183098861837907, t_mu);
     vec3 texel = clamp(t, 0.0, 1.0) * (vec3(size.xy, n_mu) - 1.0) + 0.5;
     texel.z += level * n_mu;
@@ -111,7 +115,7 @@ vec2 scattering_source_lookup(sampler3D lut, vec3 entry_us, vec3 dir_us, vec3 to
     vec2 source = mix(a, b, level - lower);
     float below = min(optical_radius / SCATTERING_R_MIN, 1.0);
     float single = single_scattering_model(entry_us, dir_us, to_sun_us, coordinates.z, optical_radius) + below * source.x;
-    float multiple = below * (multiple_scattering_model(entry_us, to_sun_us, r) + source.y);
+    float multiple = below * multiple_scattering_model(entry_us, dir_us, to_sun_us, coordinates.z, r) * source.y;
     return max(vec2(single, multiple), 0.0);
 }
 

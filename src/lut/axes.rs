@@ -62,20 +62,17 @@ pub const LEVELS: u32 = STEPS * (DENSITY_LEVELS - 1) + 1;
 pub const DENSITY_LEVELS: u32 = 8;
 /// Levels of the table from one density level to the next.
 pub const STEPS: u32 = 4;
-/// Optical radius from which solutions are a whole density level apart; below, where colours change from those of haze to
-/// those of cloud, half of one.
-const SOLVED_APART_FROM: f64 = 20.0;
 /// Optical radius of the first level; the thinnest ring-0 particle of the paper (0.07 1/m · 92 m · 2^-4).
 pub const R_MIN: f64 = 0.4;
 /// Optical radius of the last level. Colours are constant beyond.
 pub const R_MAX: f64 = 102.4;
 /// Optical depth up to which chords are spaced evenly, above it geometrically (tuned: least interpolation error).
-pub const MU_SCALE: f64 = 3.0;
+pub const MU_SCALE: f64 = 20.0;
 /// Zenith cosine at which the spacing changes from chords to impact parameters, which then are even: the middle of the
-/// ball, seen from the eye, is a disc like any other. The impact parameter there is 0.8.
-pub const MU_SPLIT: f64 = 0.6;
+/// ball, seen from the eye, is a disc like any other. The impact parameter there is 0.66.
+pub const MU_SPLIT: f64 = 0.75;
 /// Share of the axis that lies below [`MU_SPLIT`].
-const MU_SPLIT_AT: f64 = 0.6;
+const MU_SPLIT_AT: f64 = 0.75;
 
 /// Axis position 0..=1 of a zenith cosine.
 fn mu_to_axis(mu: f64, optical_radius: f64) -> f64 {
@@ -121,8 +118,7 @@ impl ScatteringShape {
 
     /// Whether a level is solved; the others are filled in by a cubic through four that are.
     pub fn solved(level: u32) -> bool {
-        let whole = Self::optical_radius(level) > SOLVED_APART_FROM;
-        level.is_multiple_of(if whole { STEPS } else { STEPS / 2 })
+        level.is_multiple_of(2)
     }
 
     /// The levels that fill in one that is not solved, and their weights: Lagrange's cubic in log2 of the optical radius.

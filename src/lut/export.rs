@@ -188,7 +188,7 @@ fn scattering(shape: ScatteringShape, texels: &[[f32; 2]], albedo: f64) -> [Expo
                     let [single, multiple] = texels[texel as usize].map(f64::from);
                     let (ray, opacity) = (c.ray(), opacity(2.0 * r * c.mu));
                     let single = (single + single_scattering_model(&ray, r)).max(0.0);
-                    let multiple = (multiple + multiple_scattering_model(&ray, r)).max(0.0);
+                    let multiple = (multiple * multiple_scattering_model(&ray, r)).max(0.0);
                     values[0].push((albedo * single * opacity) as f32);
                     values[1].push((multiple * opacity) as f32);
                 }

@@ -75,10 +75,12 @@ pub fn single_scattering_model(ray: &LitRay, optical_radius: f64) -> f64 {
     sum / opacity(tau)
 }
 
-/// The bend of multiple scattering at the terminator [1/sr]. GLSL twin: `multiple_scattering_model`.
+/// What multiple scattering is nearly proportional to. GLSL twin: `multiple_scattering_model`, where it is told.
 pub fn multiple_scattering_model(ray: &LitRay, optical_radius: f64) -> f64 {
-    let (cos_sun, width) = (ray.entry.dot(ray.to_sun), 2.0 / optical_radius);
-    0.225 * optical_radius / (optical_radius + 15.0) * (cos_sun + cos_sun.hypot(width))
+    let (cos_sun, cos_theta) = (ray.entry.dot(ray.to_sun), ray.dir.dot(ray.to_sun));
+    let mu = (-ray.entry.dot(ray.dir)).clamp(0.0, 1.0);
+    let lit = cos_sun + cos_sun.hypot(4.0 / optical_radius);
+    0.05 + lit / (lit + 2.0 * mu + 0.05) * 0.75 * (1.25 - cos_theta).powf(-1.5)
 }
 
 /// Fraction of the beam that leaves after exactly one event: Eq. 9 times the phase function over all rays.
@@ -153,7 +155,7 @@ impl ScatteringLookup {
     /// Radiance of light scattered twice or more, for unit irradiance [1/sr].
     pub fn multiple(&self, c: &RayCoordinates, optical_radius: f64) -> f64 {
         let model = multiple_scattering_model(&c.ray(), optical_radius.clamp(R_MIN, R_MAX));
-        let source = (model + self.fetch(c, optical_radius)[1]) * (optical_radius / R_MIN).min(1.0);
+        let source = model * self.fetch(c, optical_radius)[1] * (optical_radius / R_MIN).min(1.0);
         source.max(0.0) * opacity(2.0 * optical_radius * c.mu)
     }
 }
