@@ -10,5 +10,3 @@ layout(binding = 3, std430) restrict readonly buffer CellFirst { uint first[]; }
 layout(binding = 4, std430) restrict coherent buffer EntryCounts { uint count[]; } entry_counts;
 void visit(uint cell, uint particle) { atomicAdd(entry_counts.count[cell], 1u); }
 #include "pathtrace/cover.glsl"
-
-void main() { cover(gl_GlobalInvocationID.x); }

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Fills the cells' lists, in arbitrary order. `entry_counts` counts down to zero.
+// Fills the cells' lists from their beginnings, in arbitrary order. `entry_counts` counts down to zero.
 #include "pathtrace/cells.glsl"
 layout(local_size_x = 64) in;
 layout(binding = 0, std430) restrict readonly buffer CellParamsBuffer { CellParams cells; } params;
@@ -10,10 +10,9 @@ layout(binding = 3, std430) restrict readonly buffer CellFirst { uint first[]; }
 layout(binding = 4, std430) restrict coherent buffer EntryCounts { uint count[]; } entry_counts;
 layout(binding = 5, std430) restrict readonly buffer EntryFirst { uint first[]; } entry_first;
 layout(binding = 6, std430) restrict writeonly buffer Entries { CellEntry entry[]; } entries;
+layout(push_constant) uniform CellFillPush { uint cell_count; uint entry_count; } push;
 void visit(uint cell, uint particle) {
-    uint slot = entry_first.first[cell] + atomicAdd(entry_counts.count[cell], 0xffffffffu) - 1u;
-    entries.entry[slot].particle = particle;
+    uint end = cell + 1u < push.cell_count ? entry_first.first[cell + 1u] : push.entry_count;
+    entries.entry[end - atomicAdd(entry_counts.count[cell], 0xffffffffu)].particle = particle;
 }
 #include "pathtrace/cover.glsl"
-
-void main() { cover(gl_GlobalInvocationID.x); }

@@ -47,7 +47,13 @@ layout(binding = 8, std430) restrict readonly buffer Air { AirParams params; } a
 layout(binding = 9, std430) restrict readonly buffer Light { SkyLight params; } sky_light;
 layout(binding = 10, std430) restrict buffer States { PathState state[]; } states;
 layout(binding = 11, std430) restrict buffer Sums { PixelSums sums[]; } pixels;
-layout(binding = 12, std430) restrict coherent buffer Activity { uint unfinished; uint steps; uint events; } activity;
+layout(binding = 12, std430) restrict coherent buffer Activity {
+    uint unfinished;
+    uint steps;
+    uint events;
+    uint tentative;
+    uint real;           // quarters of an event
+} activity;
 layout(binding = 13) uniform sampler3D detail_tile;
 layout(binding = 14) uniform sampler3D profile_volume;
 layout(binding = 15) uniform sampler2D sky_smooth;
@@ -76,7 +82,10 @@ AirParams clear_air;
 
 PathState s;
 uint pixel_index;
-uint events_met; // in this dispatch
+// In this dispatch.
+uint events_met;
+uint tentative_met;
+float real_met; // of those, the part that was real
 
 vec4 draw() { return unit_interval(pcg4d(uvec4(pixel_index, push.first_sample + s.sample_index, s.draws++, medium.seed))); }
 
@@ -285,10 +294,15 @@ bool step_ray(out bool hit) {
     vec4 u = draw();
     s.tau = exponential(u.z);
     float chosen = u.w * cell.majorant;
-    uint i = 0u;
-    while (i + 1u < cell.count && entries.entry[cell.first + i].sum <= chosen) ++i;
-    Particle p = particles.elements[entries.entry[cell.first + i].particle];
+    uint i = cell.first, last = cell.first + cell.count - 1u; // the first whose sum is above what was chosen
+    while (i < last) {
+        uint middle = (i + last) / 2u;
+        if (entries.entry[middle].sum <= chosen) i = middle + 1u; else last = middle;
+    }
+    Particle p = particles.elements[entries.entry[i].particle];
     float real = profile_at(p, s.origin + s.t * s.dir);
+    tentative_met += 1u;
+    real_met += real;
     if (s.kind == FLIGHT_FREE || s.kind == FLIGHT_SIDE) {
         hit = u.x < real;
         return hit;
@@ -322,6 +336,8 @@ void main() {
     pixel_index = push.first_pixel + index;
     uint taken = 0u;
     events_met = 0u;
+    tentative_met = 0u;
+    real_met = 0.0;
     for (uint turn = 0u; turn < push.steps; ++turn) {
         if (s.kind == FLIGHT_NONE) {
             if (s.sample_index >= push.samples) break;
@@ -342,4 +358,6 @@ void main() {
     if (s.kind != FLIGHT_NONE || s.sample_index < push.samples) atomicAdd(activity.unfinished, 1u);
     atomicAdd(activity.steps, taken);
     atomicAdd(activity.events, events_met);
+    atomicAdd(activity.tentative, tentative_met);
+    atomicAdd(activity.real, uint(4.0 * real_met + 0.5));
 }

@@ -20,6 +20,8 @@ const TOP_CELLS: [f64; 2] = [64.0, 30_000.0];
 const MOST_CELLS: u32 = 4_000_000;
 /// Entries of all lists at most: 8 bytes each.
 const MOST_ENTRIES: u32 = 12_000_000;
+/// Groups along a side of a dispatch that every device takes.
+const MOST_GROUPS: u32 = 65_535;
 /// Edge of a cell in particle radii to begin with. Finer cells have tighter majorants, but more walls to cross.
 const FINENESS: f32 = 0.33;
 
@@ -80,6 +82,9 @@ impl CellGrid {
         let mut params = geometry(find_bounds(frames, list, particles)?, particles, sigma_t);
         let top_cells: u32 = params.top.iter().product();
         let threads = [particles, 1, 1];
+        // A group of 64 a particle.
+        let rows = particles.div_ceil(MOST_GROUPS).max(1);
+        let group_threads = [64 * particles.div_ceil(rows), rows, 1];
         let top_threads = [top_cells, 1, 1];
         let least_radius = Buffer::array::<u32>(gpu, "least radius", top_cells as usize)?;
         let cell_counts = Buffer::array::<u32>(gpu, "cell counts", top_cells as usize)?;
@@ -128,7 +133,7 @@ impl CellGrid {
                         cell_first: &cell_first,
                         entry_counts: &entry_counts,
                     };
-                    rec.dispatch(&count_pipeline, &bindings, &(), threads)?;
+                    rec.dispatch(&count_pipeline, &bindings, &(), group_threads)?;
                     scan.record(rec, &entry_counts, cells.max(1), &entry_first, &total)?;
                     rec.copy_buffer(&total, &read_total, 4);
                     rec.make_visible_to_host(&read_total);
@@ -154,7 +159,7 @@ impl CellGrid {
                         entry_first: &entry_first,
                         entries: &list_entries,
                     };
-                    rec.dispatch(&fill_pipeline, &bindings, &(), threads)?;
+                    rec.dispatch(&fill_pipeline, &bindings, &[cells, entries], group_threads)?;
                     let bindings = order::Bindings {
                         params: &params_buffer,
                         particles: list,

@@ -20,10 +20,15 @@ use crate::{Error, Result};
 
 /// Pixels that are traced together: 128 bytes of state and 64 of sums each.
 const TILE: usize = 1 << 18;
+/// Counters that a dispatch leaves (`Activity` of `glsl/pathtrace/trace.comp`).
+const ACTIVITY: usize = 5;
 /// Size of `PathState` of `glsl/pathtrace/path.glsl`.
 const STATE_WORDS: usize = crate::shared::layout::path_state::SIZE / 4;
 /// Time that a dispatch is to take [s]: drivers reset a device that has not answered for about two seconds.
 const DISPATCH_SECONDS: f64 = 0.2;
+/// Steps of a dispatch at most: Mesa 22.3's lavapipe ends all loops of a thread after 65 535 rounds, and one of these has
+/// about five, and a few for each binary choice from a list.
+const MOST_STEPS: u32 = 2048;
 /// Steps of the first dispatch.
 const FIRST_STEPS: u32 = 32;
 /// Time that a pass is to take [s]; between passes a run can be stopped and kept.
@@ -98,6 +103,18 @@ pub struct Work {
     pub steps: u64,
     /// Scattering events.
     pub events: u64,
+    /// Tentative events: the real ones, and null collisions.
+    pub tentative: u64,
+    /// How much of those was real, in quarters of an event.
+    pub real: u64,
+}
+
+impl Work {
+    /// Which part of all tentative events was none, 0 to 1.
+    #[must_use]
+    pub fn null_collisions(&self) -> f64 {
+        1.0 - self.real as f64 / (4 * self.tentative).max(1) as f64
+    }
 }
 
 #[repr(C)]
@@ -236,8 +253,8 @@ impl PathTracer {
             sums: Buffer::array::<PixelSums>(gpu, "pixel sums", tile)?,
             upload: Buffer::new(gpu, "pixel sums upload", sums_bytes, BufferKind::Upload)?,
             readback: Buffer::new(gpu, "pixel sums readback", sums_bytes, BufferKind::Readback)?,
-            activity: Buffer::array::<[u32; 3]>(gpu, "path activity", 1)?,
-            read_activity: Buffer::new(gpu, "path activity readback", 12, BufferKind::Readback)?,
+            activity: Buffer::array::<[u32; ACTIVITY]>(gpu, "path activity", 1)?,
+            read_activity: Buffer::new(gpu, "path activity readback", 4 * ACTIVITY as u64, BufferKind::Readback)?,
             pixels: vec![PixelSums::default(); count],
             samples: 0,
             steps: FIRST_STEPS,
@@ -379,13 +396,15 @@ impl PathTracer {
             };
             self.dispatch(frames, &push)?;
             let seconds = started.elapsed().as_secs_f64();
-            let activity = self.read_activity.read::<u32>(0, 3);
+            let activity = self.read_activity.read::<u32>(0, ACTIVITY);
             let unfinished = activity[0];
             self.work.steps += u64::from(activity[1]);
             self.work.events += u64::from(activity[2]);
+            self.work.tentative += u64::from(activity[3]);
+            self.work.real += u64::from(activity[4]);
             // Towards the time that a dispatch may take, by at most a factor of 2 since its load can rise as fast.
             let factor = (DISPATCH_SECONDS / seconds.max(1e-6)).clamp(0.25, 2.0);
-            steps = ((f64::from(steps) * factor) as u32).clamp(1, 1 << 20);
+            steps = ((f64::from(steps) * factor) as u32).clamp(1, MOST_STEPS);
             all_busy &= unfinished as usize * 2 > count;
             if all_busy {
                 self.steps = steps; // as a full tile needs them
@@ -429,9 +448,9 @@ impl PathTracer {
         };
         frames.run(|rec| {
             rec.pass("paths", |rec| {
-                rec.fill_buffer(&self.activity, 0, 12, 0);
+                rec.fill_buffer(&self.activity, 0, self.activity.size(), 0);
                 rec.dispatch(&self.pipeline, &bindings, push, [push.pixel_count, 1, 1])?;
-                rec.copy_buffer(&self.activity, &self.read_activity, 12);
+                rec.copy_buffer(&self.activity, &self.read_activity, self.activity.size());
                 rec.make_visible_to_host(&self.read_activity);
                 Ok(())
             })
