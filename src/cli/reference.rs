@@ -82,7 +82,8 @@ pub fn run(args: &ReferenceArgs) -> Result<Outcome> {
     let seconds = started.elapsed().as_secs_f64();
     let paths = f64::from(tracer.samples() - first) * f64::from(size.width) * f64::from(size.height);
     note(&format!(
-        "wrote {} ({}x{}, {} samples a pixel, relative noise {:.4}, {:.0} paths/s, {:.0} events and {:.0} steps a path)",
+        "wrote {} ({}x{}, {} samples a pixel, relative noise {:.4}, {:.0} paths/s, {:.0} events and {:.0} steps a path, \
+         {:.0} % null collisions)",
         args.output.display(),
         size.width,
         size.height,
@@ -91,6 +92,7 @@ pub fn run(args: &ReferenceArgs) -> Result<Outcome> {
         paths / seconds.max(1e-9),
         tracer.work().events as f64 / paths.max(1.0),
         tracer.work().steps as f64 / paths.max(1.0),
+        100.0 * tracer.work().null_collisions(),
     ));
     let Some(signal) = stopped else { return Ok(Outcome::Done) };
     let state = files.state.display();
