@@ -8,7 +8,9 @@ use welkin::lut::transport::plan::{Plan, Resolution, rotations};
 use welkin::reference::monte_carlo::{Medium, balance, multiple_scattering, next_uniform, parallel};
 use welkin::reference::phase::PhaseFunction::{self, CornetteShanks, HenyeyGreenstein};
 use welkin::reference::quadrature::gauss_legendre;
-use welkin::reference::scattering::{directly_transmitted, opacity, single_fraction, single_scattering};
+use welkin::reference::scattering::{
+    MEAN_PATH_LENGTH, directly_transmitted, opacity, single_fraction, single_scattering,
+};
 use welkin::reference::sphere::RayCoordinates;
 use welkin::reference::transport::{Solution, solve};
 
@@ -198,6 +200,30 @@ fn scattered_energy_agrees_with_forward_walks_under_absorption() {
     let scattered = single_fraction(&medium, r) + multiple_fraction(&solution, &mus, &weights);
     let truth = balance(&medium, r, 400_000, 5).scattered;
     assert!((scattered - truth.mean).abs() < 0.001 + 4.0 * truth.error, "{scattered}, {truth:?}");
+}
+
+#[test]
+fn the_mean_path_is_four_times_volume_over_surface_whatever_the_scattering() {
+    // Without absorption. What leaves is Σ p_n ϖ^n over the number n of events, whose derivative at ϖ = 1 is the mean
+    // number of events: R times the mean path.
+    for (phase, g) in [(CornetteShanks, 0.7), (HenyeyGreenstein, 0.85)] {
+        for r in [0.5, 5.0] {
+            let (mus, weights) = views(r, 20);
+            let leaving = |albedo: f64| {
+                let medium = medium(phase, g, g, albedo);
+                let mut resolution = Resolution::for_medium(&medium, r, 1.0);
+                resolution.j_max = 0;
+                let solution = solve(&medium, r, resolution, &mus, None);
+                directly_transmitted(r) + single_fraction(&medium, r) + multiple_fraction(&solution, &mus, &weights)
+            };
+            // Differences over steps h and 2h, extrapolated to 0.
+            let h = 0.02 / (1.0 + r * r);
+            let [none, near, far] = [0.0, h, 2.0 * h].map(|absorbed| leaving(1.0 - absorbed));
+            let path = (2.0 * (none - near) / h - (none - far) / (2.0 * h)) / r;
+            println!("{phase:?} g = {g}, R = {r}: {path:.4}");
+            assert!((path / MEAN_PATH_LENGTH - 1.0).abs() < 0.002, "{phase:?} {g} R = {r}: {path}");
+        }
+    }
 }
 
 #[test]
