@@ -1,34 +1,23 @@
 //! The tile of billow noise on the device against its f64 reference.
 
-use welkin::detail::{DetailTile, TILE_SIZE};
+#[path = "support/tile.rs"]
+mod tile;
+
+use welkin::detail::TILE_SIZE;
 use welkin::gpu::standalone::{Options, Standalone};
-use welkin::gpu::{Buffer, BufferKind};
 use welkin::reference::detail::{CELLS, billow};
 
 #[test]
 fn every_texel_of_the_tile_is_the_noise_at_its_centre() {
     let mut device = Standalone::new(Options { validation: true, ..Options::default() }).unwrap();
-    let gpu = device.gpu().clone();
-    let tile = DetailTile::new(&gpu).unwrap();
-    let count = TILE_SIZE.pow(3) as usize;
-    let bytes = Buffer::new(&gpu, "tile bytes", 8 * count as u64, BufferKind::Readback).unwrap();
-    device
-        .frames()
-        .run(|rec| {
-            tile.record(rec)?;
-            rec.copy_image_to_buffer(&tile.image, &bytes);
-            rec.make_visible_to_host(&bytes);
-            Ok(())
-        })
-        .unwrap();
-    let texels: Vec<[u16; 4]> = bytes.read(0, count);
+    let texels = tile::texels(&mut device);
     let scale = f64::from(CELLS) / f64::from(TILE_SIZE);
     let (mut sum, mut creases) = (0.0, 0);
     for (index, texel) in texels.iter().enumerate() {
         let index = index as u32;
         let at = [index % TILE_SIZE, index / TILE_SIZE % TILE_SIZE, index / TILE_SIZE.pow(2)];
         let (value, gradient) = billow(at.map(|c| (f64::from(c) + 0.5) * scale));
-        let texel = texel.map(|bits| half::f16::from_bits(bits).to_f64());
+        let texel = texel.map(half::f16::to_f64);
         // f16 keeps 11 bits: 2^-11 of values up to 1, of slopes up to 4.
         assert!((texel[3] - value).abs() < 6e-4, "{at:?}: {} {value}", texel[3]);
         // On a crease two bumps tie, and rounding picks either slope.
@@ -36,8 +25,8 @@ fn every_texel_of_the_tile_is_the_noise_at_its_centre() {
         creases += usize::from(!same);
         sum += value;
     }
-    assert!(creases < count / 10_000, "{creases} slopes differ");
-    let mean = sum / count as f64;
+    assert!(creases < texels.len() / 10_000, "{creases} slopes differ");
+    let mean = sum / texels.len() as f64;
     assert!((0.4..0.8).contains(&mean), "a mean of {mean} is no billow");
     assert_eq!(device.messages().unwrap().all(), Vec::<String>::new());
 }

@@ -3,31 +3,8 @@ mod support;
 
 use std::path::Path;
 
-use support::folder::{directory, files, npy, refused, run};
+use support::folder::{BALLS, directory, files, npy, refused, run};
 use support::stderr;
-
-/// Two balls in the sun before black, no tables.
-const SCENE: &str = r#"
-    [camera]
-    position = [0, 0, 0]
-    pitch = 0
-    fov_y = 40
-    [sun]
-    elevation = 40
-    azimuth = 60
-    [clouds]
-    source = "particles"
-    style = "radial"
-    [[clouds.particle]]
-    centre = [0, 0, -500]
-    radii = [100, 80, 100]
-    [[clouds.particle]]
-    centre = [80, 40, -450]
-    radii = [60, 50, 70]
-    density = 0.4
-    [sky]
-    model = "none"
-"#;
 
 /// The values of a picture in f32.
 fn exr(path: &Path) -> Vec<f32> {
@@ -47,7 +24,7 @@ fn told(output: &std::process::Output) -> (u32, f64) {
 
 #[test]
 fn every_format_holds_the_same_picture_and_its_variance() {
-    let directory = directory(SCENE);
+    let directory = directory(BALLS);
     let (path, line) = (directory.path(), "reference sky.toml --size 16x12 --spp 64");
     let output = run(path, &format!("{line} -o a.exr --aux"));
     assert_eq!(files(path), ["a.exr", "a.state", "a.transmittance.npy", "a.variance.exr"]);
@@ -89,7 +66,7 @@ fn every_format_holds_the_same_picture_and_its_variance() {
 
 #[test]
 fn it_stops_at_the_samples_or_at_the_noise_asked_for() {
-    let directory = directory(SCENE);
+    let directory = directory(BALLS);
     let go = |line: &str| told(&run(directory.path(), &format!("reference sky.toml -o a.npy --size 16x12 {line}")));
     assert_eq!(go("--spp 5").0, 5);
     let (samples, noise) = go("--noise 0.2");
@@ -108,7 +85,7 @@ fn it_stops_at_the_samples_or_at_the_noise_asked_for() {
 
 #[test]
 fn a_run_that_was_stopped_goes_on_to_the_same_bits() {
-    let directory = directory(SCENE);
+    let directory = directory(BALLS);
     let path = directory.path();
     let line = "reference sky.toml --size 17x11 --sun disc --antialias --seed 3";
     run(path, &format!("{line} -o a.exr --spp 41"));
@@ -125,7 +102,7 @@ fn a_run_that_was_stopped_goes_on_to_the_same_bits() {
 
 #[test]
 fn bad_input_is_named_and_leaves_everything_as_it_was() {
-    let directory = directory(SCENE);
+    let directory = directory(BALLS);
     let path = directory.path();
     let line = "reference sky.toml --size 9x7 --spp 4";
     run(path, &format!("{line} -o a.npy"));

@@ -7,29 +7,10 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use support::folder::{command, directory, files, run};
+use support::folder::{BALLS, command, directory, files, run};
 
 const INTERRUPT: (&str, i32) = ("INT", 2);
 const TERMINATE: (&str, i32) = ("TERM", 15);
-
-/// Before black, a ball that fills the picture; no tables.
-const SCENE: &str = r#"
-    [camera]
-    position = [0, 0, 0]
-    pitch = 0
-    fov_y = 20
-    [sun]
-    elevation = 40
-    azimuth = 60
-    [clouds]
-    source = "particles"
-    style = "radial"
-    [[clouds.particle]]
-    centre = [0, 0, -500]
-    radii = [120, 120, 120]
-    [sky]
-    model = "none"
-"#;
 
 /// A command under way; killed if the test fails.
 struct Running(Child);
@@ -89,7 +70,7 @@ impl Running {
 #[test]
 fn a_reference_keeps_what_it_has_and_goes_on_to_the_same_bits() {
     for (signal, name) in [(INTERRUPT, "SIGINT"), (TERMINATE, "SIGTERM")] {
-        let directory = directory(SCENE);
+        let directory = directory(BALLS);
         let path = directory.path();
         let line = "reference sky.toml --size 12x8";
         let running = Running::start(path, &format!("{line} -o a.exr --spp 100000000"));
@@ -118,7 +99,7 @@ fn a_reference_keeps_what_it_has_and_goes_on_to_the_same_bits() {
 
 #[test]
 fn a_second_signal_ends_a_reference_at_once() {
-    let directory = directory(SCENE);
+    let directory = directory(BALLS);
     // A pass of a minute or so, longer than the time that it is given to end.
     let line = "reference sky.toml -o a.exr --size 1200x1200 --spp 100 --set clouds.sigma_t=1";
     let running = Running::start(directory.path(), line);
@@ -135,7 +116,7 @@ fn a_second_signal_ends_a_reference_at_once() {
 #[test]
 fn voxelize_leaves_nothing() {
     for name in ["a.npy", "a.vdb"] {
-        let directory = directory(SCENE);
+        let directory = directory(BALLS);
         let line = format!("voxelize sky.toml -o {name} --resolution 1024");
         let running = Running::start(directory.path(), &line);
         running.send(TERMINATE);

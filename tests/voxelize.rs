@@ -6,11 +6,9 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use support::folder::{directory, json, npy, refused, run};
-use support::{stderr, vdb};
+use support::{stderr, tile, vdb};
 use welkin::Params;
-use welkin::detail::{DetailTile, TILE_SIZE};
 use welkin::gpu::standalone::{Options, Standalone};
-use welkin::gpu::{Buffer, BufferKind};
 use welkin::output::{NpyVolume, VdbGrid, VdbWriter};
 use welkin::params::{ParticleDesc, Source, Style};
 use welkin::reference::extinction::{Tile, to_unit_ball};
@@ -130,20 +128,7 @@ fn the_mass_of_homogeneous_particles_is_that_of_their_ellipsoids_the_closer_the_
 
 /// The tile of noise as the device has it (tests/oracle_detail.rs checks it): its rounding to 16 bits is no matter here.
 fn stored_tile(device: &mut Standalone) -> Tile {
-    let gpu = device.gpu().clone();
-    let tile = DetailTile::new(&gpu).unwrap();
-    let count = TILE_SIZE.pow(3) as usize;
-    let bytes = Buffer::new(&gpu, "tile bytes", 8 * count as u64, BufferKind::Readback).unwrap();
-    device
-        .frames()
-        .run(|rec| {
-            tile.record(rec)?;
-            rec.copy_image_to_buffer(&tile.image, &bytes);
-            rec.make_visible_to_host(&bytes);
-            Ok(())
-        })
-        .unwrap();
-    let texels: Vec<[half::f16; 4]> = bytes.read(0, count);
+    let texels = tile::texels(device);
     Tile::stored(texels.iter().map(|texel| texel[3].to_f64()).collect())
 }
 

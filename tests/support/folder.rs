@@ -6,6 +6,29 @@ use std::process::{Command, Output};
 
 use super::{stderr, welkin};
 
+/// Two balls in the sun before black, no tables.
+pub const BALLS: &str = r#"
+    [camera]
+    position = [0, 0, 0]
+    pitch = 0
+    fov_y = 40
+    [sun]
+    elevation = 40
+    azimuth = 60
+    [clouds]
+    source = "particles"
+    style = "radial"
+    [[clouds.particle]]
+    centre = [0, 0, -500]
+    radii = [100, 80, 100]
+    [[clouds.particle]]
+    centre = [80, 40, -450]
+    radii = [60, 50, 70]
+    density = 0.4
+    [sky]
+    model = "none"
+"#;
+
 /// A folder for a test, with `sky.toml` in it.
 pub fn directory(scene: &str) -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();

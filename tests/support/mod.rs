@@ -2,6 +2,7 @@
 #![allow(dead_code)] // Each test file uses its own part.
 
 pub mod folder;
+pub mod tile;
 pub mod vdb;
 
 use std::path::{Path, PathBuf};
