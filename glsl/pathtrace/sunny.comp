@@ -14,8 +14,8 @@ CellParams cell_grid;
 #include "pathtrace/find.glsl"
 
 // Density is less than the majorant, and light finds gaps: this much of the optical depth counts, and no cell is given
-// up (both tuned: less of either costs more time than it saves in noise).
-const float SHARE = 0.05;
+// up (both tuned by variance times work, docs/reference.md).
+const float SHARE = 0.02;
 const float LEAST = 0.05;
 
 void main() {
