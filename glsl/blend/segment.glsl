@@ -2,6 +2,9 @@
 layout(constant_id = 0) const uint LIGHTING = LIGHTING_TABLES;
 layout(constant_id = 1) const uint HOMOGENEOUS = 0;   // 1: density 1 everywhere inside, no table and no detail
 
+// Radius of the ball on which rays look their detail up: of those tried, the largest that draws silhouettes right.
+const float DETAIL_BALL = 0.6;
+
 // `pixel`: centre of the pixel, as gl_FragCoord.xy has it.
 Segment particle_segment(uint index, vec2 pixel) {
     FrameParams f = frame.params;
@@ -15,9 +18,14 @@ Segment particle_segment(uint index, vec2 pixel) {
     vec3 normal_shift = vec3(0.0);
     float depth = 0.0;
     if (HOMOGENEOUS == 0u && medium.params.detail > 0.0) {
-        float t_surface = ray.t_closest - half_chord * ray.metres;
-        vec3 position = f.camera + t_surface * dir + f.origin;
+        // The noise is that of the direction in which the ray meets the surface, which only the noise knows: a smaller ball
+        // stands for it. Rays that miss that ball take the direction of their point nearest to the centre, as a
+        // silhouette does (glsl/density/extinction.glsl has the body that this draws).
+        float in_front = sqrt(max(DETAIL_BALL * DETAIL_BALL - ray.b2, 0.0));
+        vec3 facing = normalize(ray.closest - in_front * ray.dir_us);
+        vec3 position = p.centre + rotate(p.rotation, facing * p.semi_axes) + f.origin;
         float size = min(p.semi_axes.x, min(p.semi_axes.y, p.semi_axes.z));
+        float t_surface = ray.t_closest - in_front * ray.metres;
         float footprint = max(t_surface, 0.0) * 2.0 * f.tan_half_fov_y / float(f.low_height);
         Detail d = surface_detail(detail_tile, position, size, footprint);
         depth = min(medium.params.detail * d.depth / size, 0.6);

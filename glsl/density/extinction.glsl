@@ -1,7 +1,7 @@
-// Extinction of a particle at a point of space: what `voxelize` samples and path tracing flies through. Along a ray the
-// renderer shrinks the unit ball to the surface that detail leaves where the ray enters; in space the ball is shrunk along
-// the direction n = p_us / |p_us| of each point, to r(n) = 1 - depth(ellipsoid's point at n), and the profile with it. The
-// particle is star-shaped. Every style but the homogeneous one is displaced. CPU twin: src/reference/extinction.rs.
+// Extinction of a particle at a point of space: what `voxelize` samples and path tracing flies through. In space the
+// unit ball is shrunk along the direction n = p_us / |p_us| of each point, to r(n) = 1 - depth(ellipsoid's point at n), and
+// the profile with it: the particle is star-shaped. Along a ray the renderer shrinks it to r in one direction, near to where
+// the ray meets the surface (blend/segment.glsl). Every style but the homogeneous one is displaced. CPU twin: src/reference/extinction.rs.
 #ifndef DENSITY_EXTINCTION
 #define DENSITY_EXTINCTION
 #include "common/particle.glsl"

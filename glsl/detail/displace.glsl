@@ -1,5 +1,5 @@
 // Detail at run time (Yusov 5.4, "3D noise is used to add small details"): billow noise shrinks the particle's
-// ellipsoid along the ray's point of entry, so that silhouettes break into bumps and the light follows them. The noise is
+// ellipsoid where the ray meets it, so that silhouettes break into bumps and the light follows them. The noise is
 // anchored to the world, so overlapping particles share one surface.
 #ifndef DETAIL_DISPLACE
 #define DETAIL_DISPLACE
