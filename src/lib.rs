@@ -155,7 +155,7 @@
 //! - **Light is found at three points of a particle**, both poles towards the sun and the centre: overlapping particles agree on
 //!   the light between them. (`tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height` checks all three)
 //! - **Sunlight fades among particles as diffusion lets it**, 1 / (1 + ξ τ), with τ counted per particle of a crowd, and a
-//!   crowd lends its members light (`glsl/lighting/transfer.glsl`); only what comes straight from the sun fades as exp(−τ).
+//!   crowd's members lend each other light, which is flat (`glsl/lighting/transfer.glsl`); only what comes straight from the sun fades as exp(−τ).
 //!   The paper dims all of it by exp(−ξ τ), which is an option (`clouds.transfer`). Fitted to path-traced clouds: `docs/accuracy.md`
 //!   tells the gain. (`src/reference/lighting.rs::alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less`,
 //!   `tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height`)
@@ -168,7 +168,10 @@
 //!
 //! Shading (Yusov 4.4, 5.4):
 //! - **Detail noise displaces the surface**, along silhouettes too, in octaves anchored to the world; the paper does not say how
-//!   it adds it. (`tests/oracle_detail.rs::every_texel_of_the_tile_is_the_noise_at_its_centre`)
+//!   it adds it. (`tests/oracle_detail.rs::every_texel_of_the_tile_is_the_noise_at_its_centre`,
+//!   `tests/reference.rs::rendered_silhouettes_are_those_of_the_traced_density`)
+//! - **Closed sky shines** with three quarters of the mean of sky and ground: cloud that absorbs nothing is not black in the
+//!   shade of its like. Fitted to path-traced skies (`docs/accuracy.md`).
 //!
 //! Compositing (Yusov 5.5):
 //! - **Transmittance is exp(−Σ τ)**, summed beside the merge, hence exact for any number of particles in any order.

@@ -7,7 +7,7 @@ use clouds::{Setup, Stages, open, read, silent};
 use glam::DVec3;
 use welkin::params::Coverage;
 use welkin::reference::grid;
-use welkin::reference::lighting::{chord_ahead, reach, smooth, sun_optical_depth, sun_shares};
+use welkin::reference::lighting::{SunShares, chord_ahead, reach, smooth, sun_optical_depth, sun_shares};
 use welkin::shared::{Particle, ParticleLight};
 
 fn to_sun(elevation: f64) -> [f64; 3] {
@@ -40,7 +40,9 @@ fn no_occluder_is_missed_whatever_the_suns_height() {
             let p = &particles[index];
             let own = 2.0 * pole.length() * extinction * f64::from(p.density) * f64::from(p.fade);
             let clouds = &setup.clouds;
-            let (diffuse, direct) = sun_shares(tau, own, clouds.xi.into(), clouds.transfer);
+            let SunShares { diffuse, gathered, direct } = sun_shares(tau, own, clouds.xi.into(), clouds.transfer);
+            let got = f64::from(device_values[index].gathered);
+            assert!((got - gathered).abs() < 1e-3, "{elevation}°, particle {index}: {got}, expected {gathered}");
             for i in 0..3 {
                 // f32 positions relative to a particle are good to 4 mm of some 100 m; the direction to 1e-7 of up to
                 // 8e4 m.

@@ -18,11 +18,14 @@ struct MediumParams {
     float crease;           // strength of the crease term [1]
     float detail;           // strength of the detail noise [1]; 0 turns it off
     float relief;           // how much of the noise's slope turns the surface for lighting [1]
-    float reserved_a;
+    float lent;             // what absorption leaves of the light that particles lend each other [1]
     float reserved_b;
 };
 
 const float PI = 3.14159265358979;
+
+// Radiance of cloud in front of the sky, as share of the mean of sky and ground (fitted to path-traced skies).
+const float CLOUD_SKYLIGHT = 0.75;
 
 const uint LIGHTING_TABLES = 0u;
 const uint LIGHTING_FLAT = 1u;
@@ -44,14 +47,19 @@ vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sample
     float along = dot(entry_us, to_sun_us);
     float towards = max(along, 0.0), away = max(-along, 0.0);
     vec3 share = vec3(towards, 1.0 - towards - away, away);
+    // What neighbours lend comes from where they are, not from where the sun is.
     vec3 sunlight = sky.sun_irradiance_clouds * (medium.albedo * p_sun * single * dot(light.direct, share)
-                                                 + multiple * dot(light.diffuse, share));
+                                                 + multiple * dot(light.diffuse, share)
+                                                 + medium.lent * light.gathered * (1.0 - dot(normal_ws, frame.to_sun)));
 
     // Sky and ground as two half-spheres of constant radiance E / π, seen by the surface; creases, which lie deep below the
-    // ellipsoid, are brighter than edges (Yusov 4.4).
+    // ellipsoid, are brighter than edges (Yusov 4.4). Where neighbouring cloud stands before the sky, it shines instead
+    // with the mean of both, less what it lets through to the other side: without absorption shade is not black.
     float up = 0.5 + 0.5 * normal_ws.y;
     float crease = 1.0 + medium.crease * (first_matter - 0.25);
-    vec3 skylight = mix(sky.ground_irradiance_clouds, sky.sky_irradiance_clouds, up) * (light.ambient * crease / PI);
+    vec3 seen = mix(sky.ground_irradiance_clouds, sky.sky_irradiance_clouds, up) * crease;
+    vec3 cloud = (0.5 * CLOUD_SKYLIGHT) * (sky.ground_irradiance_clouds + sky.sky_irradiance_clouds);
+    vec3 skylight = mix(cloud, seen, light.ambient) / PI;
     return sunlight + skylight;
 }
 

@@ -12,12 +12,12 @@ struct Particle {
     uint  id;         // stable identity, also the seed of everything random about it
 };
 
-// Shares of the sunlight at the pole facing the sun, the centre and the far pole of a particle.
+// Light that reaches a particle; shares of the sunlight at the pole facing the sun, the centre and the far pole.
 struct ParticleLight {
-    vec3  diffuse;    // of what is scattered many times, the particle's neighbours lending some: 0 to 1 + GATHERED
+    vec3  diffuse;    // of what the particle scatters many times, above 1 in the depth of a crowd
     float ambient;    // visibility of the sky [0, 1]
     vec3  direct;     // of what comes straight from the sun [0, 1]
-    float reserved;
+    float gathered;   // radiance that neighbours lend it, per irradiance of the sun [1/sr]
 };
 
 // Rotates v by the unit quaternion q.

@@ -10,9 +10,4 @@ float sky_openness(float above) {
     return exp(-max(above, 0.0) / 450.0);
 }
 
-// Undersides are lit from the ground and the horizon too: they get darker, not black (tuned).
-float sky_visibility(float openness) {
-    return 0.22 + 0.78 * openness;
-}
-
 #endif

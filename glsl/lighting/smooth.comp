@@ -71,7 +71,7 @@ void main() {
             }
         }
         if (weights > 0.0) light.diffuse = weighted / weights;
-        light.ambient = sky_visibility(open / 9.0);
+        light.ambient = open / 9.0;
     }
     particle_lights.light[index] = light;
 }

@@ -33,5 +33,5 @@ void main() {
     if (visited > params.tiling.traversal_limit) atomicAdd(counters.count.truncated, 1u);
     float own = 2.0 * reach * params.tiling.extinction * particle.density * particle.fade;
     SunShares shares = sun_shares(optical_depths, own, push.xi, push.transfer);
-    sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, 0.0);
+    sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, shares.gathered);
 }

@@ -19,9 +19,9 @@ use crate::shaders::{lighting_smooth_comp as smooth, lighting_sun_comp as sun};
 use crate::shared::ParticleLight;
 use crate::tiling::Tiling;
 
-/// Light that a particle in a crowd gets from its neighbours, at most, as share of its own
+/// Radiance that a particle deep in a crowd gets from its neighbours, per irradiance of the sun [1/sr]
 /// (`glsl/lighting/transfer.glsl`).
-pub const GATHERED: f32 = 1.8;
+pub const GATHERED: f32 = 0.1;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -109,7 +109,7 @@ pub enum Lighting {
 /// How the sunlight that reaches a particle depends on the optical depth τ of the particles in front of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
-    /// Light scattered many times fades as 1 / (1 + ξ τ), and a crowd of particles is brighter than one alone
+    /// Light scattered many times fades as 1 / (1 + ξ τ), and particles of a crowd lend each other light
     /// (`glsl/lighting/transfer.glsl`); what comes straight from the sun fades as exp(-τ).
     Diffusion,
     /// All of it fades as exp(-ξ τ) (Yusov 5.3).
@@ -121,7 +121,7 @@ impl Transfer {
     #[must_use]
     pub fn xi(self) -> f32 {
         match self {
-            Self::Diffusion => 0.2,
+            Self::Diffusion => 0.1,
             Self::Exponential => 0.05,
         }
     }

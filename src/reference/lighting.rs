@@ -43,18 +43,36 @@ pub fn sun_optical_depth(
         * others.map(|(_, p)| f64::from(p.density) * f64::from(p.fade) * chord_ahead(p, start, to_sun)).sum::<f64>()
 }
 
-/// The shares of sunlight that feed what is scattered many times, and that come straight from the sun, at the points of a
-/// particle that have `tau` of others in front: the pole facing the sun, the centre, the far pole. `own`: the particle's
-/// own optical depth from pole to pole.
+/// Sunlight at a particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SunShares {
+    /// Share that feeds what the particle scatters many times, at the pole facing the sun, the centre, the far pole.
+    pub diffuse: [f64; 3],
+    /// Radiance that its neighbours lend it, per irradiance of the sun [1/sr].
+    pub gathered: f64,
+    /// Share that comes straight from the sun, at the same points.
+    pub direct: [f64; 3],
+}
+
+/// What of the sunlight reaches the points of a particle that have `tau` of others in front: the pole facing the sun, the
+/// centre, the far pole. `own`: the particle's own optical depth from pole to pole.
 #[must_use]
-pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, transfer: Transfer) -> ([f64; 3], [f64; 3]) {
+pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, transfer: Transfer) -> SunShares {
     match transfer {
-        Transfer::Exponential => (tau.map(|tau| (-xi * tau).exp()), tau.map(|tau| (-xi * tau).exp())),
+        Transfer::Exponential => {
+            let share = tau.map(|tau| (-xi * tau).exp());
+            SunShares { diffuse: share, gathered: 0.0, direct: share }
+        }
         Transfer::Diffusion => {
             let crowd = 1.0 + (tau[2] - tau[0]).max(0.0) / own.max(1e-3);
-            let gathered = 1.0 + f64::from(GATHERED) * (1.0 - 1.0 / crowd).powi(2);
+            let others = 1.0 - 1.0 / crowd;
+            let kept = 1.0 - 1.35 * others + 4.0 * others.powi(4);
             let shared_by = [crowd.powf(1.5), crowd, crowd.sqrt()];
-            (std::array::from_fn(|i| gathered / (1.0 + xi * tau[i] / shared_by[i])), tau.map(|tau| (-tau).exp()))
+            SunShares {
+                diffuse: std::array::from_fn(|i| kept / (1.0 + xi * tau[i] / shared_by[i])),
+                gathered: f64::from(GATHERED) * others / (1.0 + 2.0 * xi * tau[1]),
+                direct: tau.map(|tau| (-tau).exp()),
+            }
         }
     }
 }
@@ -70,7 +88,7 @@ pub fn reach(particle: &Particle, to_sun: DVec3) -> f64 {
     1.0 / (local / vec(particle.semi_axes)).length()
 }
 
-/// Smoothed share of sunlight and visibility of the sky of particle `index` of the grid.
+/// Smoothed share of sunlight and open share of the sky of particle `index` of the grid.
 #[must_use]
 pub fn smooth(grid: &Grid, p: &GridParams, share_of_sun: &[f64], smoothing: f64, index: usize) -> (f64, f64) {
     let packed = grid.cell_and_layer[index];
@@ -115,7 +133,7 @@ pub fn smooth(grid: &Grid, p: &GridParams, share_of_sun: &[f64], smoothing: f64,
             open += sky_openness(f64::from(top) - height);
         }
     }
-    (if weights > 0.0 { weighted / weights } else { share_of_sun[index] }, 0.22 + 0.78 * open / 9.0)
+    (if weights > 0.0 { weighted / weights } else { share_of_sun[index] }, open / 9.0)
 }
 
 #[cfg(test)]
@@ -126,12 +144,13 @@ mod tests {
     fn alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less() {
         for transfer in [Transfer::Diffusion, Transfer::Exponential] {
             let xi = f64::from(transfer.xi());
-            assert_eq!(sun_shares([0.0; 3], 5.0, xi, transfer), ([1.0; 3], [1.0; 3]));
+            let alone = SunShares { diffuse: [1.0; 3], gathered: 0.0, direct: [1.0; 3] };
+            assert_eq!(sun_shares([0.0; 3], 5.0, xi, transfer), alone);
             let mut before = f64::INFINITY;
             for tau in [0.1, 1.0, 10.0, 100.0] {
                 // The same in front of all three points: nobody overlaps.
-                let (diffuse, direct) = sun_shares([tau; 3], 5.0, xi, transfer);
-                assert!(diffuse[0] == diffuse[1] && diffuse[1] == diffuse[2]);
+                let SunShares { diffuse, gathered, direct } = sun_shares([tau; 3], 5.0, xi, transfer);
+                assert!(diffuse[0] == diffuse[1] && diffuse[1] == diffuse[2] && gathered == 0.0);
                 assert!(diffuse[0] < before && diffuse[0] >= direct[0] && direct[0] > 0.0, "{transfer:?} {tau}");
                 before = diffuse[0];
             }
@@ -139,11 +158,18 @@ mod tests {
     }
 
     #[test]
-    fn a_crowd_is_brighter_than_its_members_and_by_no_more_than_it_can_lend() {
+    fn a_crowd_lends_light_and_is_brightest_where_it_is_deep() {
         let xi = f64::from(Transfer::Diffusion.xi());
-        let lone = sun_shares([3.0, 3.0, 3.0], 4.0, xi, Transfer::Diffusion).0;
-        let crowd = sun_shares([3.0, 13.0, 23.0], 4.0, xi, Transfer::Diffusion).0;
-        assert!(crowd[0] > lone[0], "{crowd:?} {lone:?}");
-        assert!(crowd[0] < 1.0 + f64::from(GATHERED) && crowd[0] > crowd[1] && crowd[1] > crowd[2]);
+        let shares = |crowd: f64| sun_shares([0.0, 4.0 * crowd, 8.0 * crowd], 4.0, xi, Transfer::Diffusion);
+        let (few, many) = (shares(0.5), shares(4.0));
+        assert!(few.diffuse[0] < 1.0 && many.diffuse[0] > 1.0, "{few:?} {many:?}");
+        for light in [few, many] {
+            assert!(light.gathered > 0.0 && light.gathered < f64::from(GATHERED), "{light:?}");
+            assert!(light.diffuse[0] > light.diffuse[1] && light.diffuse[1] > light.diffuse[2], "{light:?}");
+        }
+        // However many there are, no share is below nothing.
+        for crowd in 0..100 {
+            assert!(shares(0.1 * f64::from(crowd)).diffuse[2] > 0.0, "{crowd}");
+        }
     }
 }
