@@ -47,10 +47,10 @@ vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sample
     float along = dot(entry_us, to_sun_us);
     float towards = max(along, 0.0), away = max(-along, 0.0);
     vec3 share = vec3(towards, 1.0 - towards - away, away);
-    // What neighbours lend comes from where they are, not from where the sun is.
+    // What neighbours lend comes from where they are, more than from where the sun is (fitted like the rest of it).
     vec3 sunlight = sky.sun_irradiance_clouds * (medium.albedo * p_sun * single * dot(light.direct, share)
                                                  + multiple * dot(light.diffuse, share)
-                                                 + medium.lent * light.gathered * (1.0 - dot(normal_ws, frame.to_sun)));
+                                                 + medium.lent * light.gathered * (1.0 - 0.5 * dot(normal_ws, frame.to_sun)));
 
     // Sky and ground as two half-spheres of constant radiance E / π, seen by the surface; creases, which lie deep below the
     // ellipsoid, are brighter than edges (Yusov 4.4). Where neighbouring cloud stands before the sky, it shines instead

@@ -13,9 +13,9 @@ struct SunShares {
 };
 
 // Fitted to path-traced heaps and skies (docs/accuracy.md).
-const float CROWD_LEAK = 1.35;      // light that a particle loses to its neighbours, which look no brighter for it
-const float CROWD_RETURN = 4.0;     // and that comes back where the crowd is deep on all sides
-const float GATHERED = 0.1;         // [1/sr]
+const float CROWD_LEAK = 2.55;      // light that a particle loses to its neighbours, which look no brighter for it
+const float CROWD_RETURN = 3.6;     // and that comes back where the crowd is deep on all sides
+const float GATHERED = 0.13;        // [1/sr]
 
 // tau: optical depths of the other particles in front of the pole facing the sun, the centre and the far pole; own: of
 // this one, from pole to pole; xi: `clouds.xi`.
@@ -33,8 +33,7 @@ SunShares sun_shares(vec3 tau, float own, float xi, uint transfer) {
     }
     float crowd = 1.0 + max(tau.z - tau.x, 0.0) / max(own, 1e-3);
     float others = 1.0 - 1.0 / crowd;
-    float others2 = others * others;
-    float kept = 1.0 - CROWD_LEAK * others + CROWD_RETURN * others2 * others2;
+    float kept = 1.0 - CROWD_LEAK * others + CROWD_RETURN * others * others;
     float root = sqrt(crowd);
     vec3 shared_by = vec3(crowd * root, crowd, root);
     return SunShares(kept / (1.0 + xi * tau / shared_by), GATHERED * others / (1.0 + 2.0 * xi * tau.y), exp(-tau));

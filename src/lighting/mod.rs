@@ -21,7 +21,7 @@ use crate::tiling::Tiling;
 
 /// Radiance that a particle deep in a crowd gets from its neighbours, per irradiance of the sun [1/sr]
 /// (`glsl/lighting/transfer.glsl`).
-pub const GATHERED: f32 = 0.1;
+pub const GATHERED: f32 = 0.13;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

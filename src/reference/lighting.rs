@@ -66,7 +66,7 @@ pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, transfer: Transfer) -> SunSh
         Transfer::Diffusion => {
             let crowd = 1.0 + (tau[2] - tau[0]).max(0.0) / own.max(1e-3);
             let others = 1.0 - 1.0 / crowd;
-            let kept = 1.0 - 1.35 * others + 4.0 * others.powi(4);
+            let kept = 1.0 - 2.55 * others + 3.6 * others.powi(2);
             let shared_by = [crowd.powf(1.5), crowd, crowd.sqrt()];
             SunShares {
                 diffuse: std::array::from_fn(|i| kept / (1.0 + xi * tau[i] / shared_by[i])),
