@@ -34,27 +34,27 @@ for package in x11-utils xdg-utils xkb-data shared-mime-info mesa-libgallium; do
 done > "$work/status"
 apt_ apt-get install -y --download-only chromium-headless-shell >/dev/null || { cat "$work/errors" >&2; die "download failed"; }
 
-root=$work/prefix/root
+tree=$work/prefix/tree
 for deb in "$work"/deb/*.deb; do
     dpkg-deb --fsys-tarfile "$deb" > "$work/tar" || die "damaged package: $(basename "$deb")"
-    tar -xf "$work/tar" -C "$root" --wildcards --no-wildcards-match-slash --no-anchored '*.so' '*.so.*' chromium truetype \
+    tar -xf "$work/tar" -C "$tree" --wildcards --no-wildcards-match-slash --no-anchored '*.so' '*.so.*' chromium truetype \
         2>/dev/null || :
 done
 rm -f "$work/tar"
 browser=usr/lib/chromium
-[ -x "$root/$browser/chromium-headless-shell" ] || die "the unpacked prefix holds no browser"
-rm -rf "$root/$browser"/libVk* "$root/$browser"/chrome_crashpad_handler "$root/$browser"/*.TOC "$root/usr/share/doc"
+[ -x "$tree/$browser/chromium-headless-shell" ] || die "the unpacked prefix holds no browser"
+rm -rf "$tree/$browser"/libVk* "$tree/$browser"/chrome_crashpad_handler "$tree/$browser"/*.TOC "$tree/usr/share/doc"
 machine_has_libc || die "Chromium's libraries need libc $libc, and this machine's is older"
 
-if [ -f "$root/$browser/libvk_swiftshader.so" ]; then # the path is relative to the manifest
-    printf '{"file_format_version": "1.0.1", "ICD": {"library_path": "./root/%s/libvk_swiftshader.so", "api_version": "1.3.0"}}\n' \
+if [ -f "$tree/$browser/libvk_swiftshader.so" ]; then # the path is relative to the manifest
+    printf '{"file_format_version": "1.0.1", "ICD": {"library_path": "./tree/%s/libvk_swiftshader.so", "api_version": "1.3.0"}}\n' \
         "$browser" > "$work/prefix/swiftshader.json"
 fi
 cat > "$work/prefix/fonts.conf" <<'CONF'
 <?xml version="1.0"?>
 <!DOCTYPE fontconfig SYSTEM "urn:fontconfig:fonts.dtd">
 <fontconfig>
-  <dir prefix="relative">root/usr/share/fonts</dir>
+  <dir prefix="relative">tree/usr/share/fonts</dir>
   <cachedir prefix="xdg">fontconfig</cachedir>
 </fontconfig>
 CONF
@@ -64,9 +64,9 @@ cat > "$work/prefix/run" <<'RUN'
 here=$(cd "${0%/*}" && pwd)
 # Only the packages' libraries: a driver's prefix that the caller runs on may have its own libc.
 unset WELKIN_PREFIX WELKIN_LD_LIBRARY_PATH VK_DRIVER_FILES VK_ICD_FILENAMES VK_LAYER_PATH VK_LOADER_LAYERS_DISABLE
-libs=$here/root/usr/lib/x86_64-linux-gnu
-export LD_LIBRARY_PATH="$libs:$libs/pulseaudio:$here/root/lib/x86_64-linux-gnu" FONTCONFIG_FILE="$here/fonts.conf"
-exec "$here/root/usr/lib/chromium/chromium-headless-shell" "$@"
+libs=$here/tree/usr/lib/x86_64-linux-gnu
+export LD_LIBRARY_PATH="$libs:$libs/pulseaudio:$here/tree/lib/x86_64-linux-gnu" FONTCONFIG_FILE="$here/fonts.conf"
+exec "$here/tree/usr/lib/chromium/chromium-headless-shell" "$@"
 RUN
 chmod +x "$work/prefix/run"
 # It must start here: a missing library shows now.

@@ -39,28 +39,28 @@ fi
 # shellcheck disable=SC2086 # a list
 apt_ apt-get install -y --download-only "$@" $packages >/dev/null || { cat "$work/errors" >&2; die "download failed"; }
 
-root=$work/prefix/root
+tree=$work/prefix/tree
 for deb in "$work"/deb/*.deb; do # shared objects and layer manifests only; many packages hold neither
     dpkg-deb --fsys-tarfile "$deb" > "$work/tar" || die "damaged package: $(basename "$deb")"
-    tar -xf "$work/tar" -C "$root" --wildcards --no-wildcards-match-slash --no-anchored '*.so' '*.so.*' 'explicit_layer.d' \
+    tar -xf "$work/tar" -C "$tree" --wildcards --no-wildcards-match-slash --no-anchored '*.so' '*.so.*' 'explicit_layer.d' \
         2>/dev/null || :
 done
 rm -f "$work/tar"
 
 # Other GPUs' drivers and other layers go; what is left is what the prefix is for.
-find "$root" -name 'libvulkan_*.so' ! -name libvulkan_lvp.so -exec rm -f {} +
-find "$root" \( -name 'libVkLayer_MESA_*' -o -name 'libVkLayer_INTEL_*' -o -name 'VkLayer_[!k]*.json' \) -exec rm -f {} +
+find "$tree" -name 'libvulkan_*.so' ! -name libvulkan_lvp.so -exec rm -f {} +
+find "$tree" \( -name 'libVkLayer_MESA_*' -o -name 'libVkLayer_INTEL_*' -o -name 'VkLayer_[!k]*.json' \) -exec rm -f {} +
 
 # With the prefix's libc, the prefix's loader starts the program; with the machine's, the library path is enough.
 if machine_has_libc; then
     start='export WELKIN_LD_LIBRARY_PATH="${LD_LIBRARY_PATH-}" LD_LIBRARY_PATH="$libs"
 exec "$@"'
 else
-    ld=$(cd "$root" && find . -name ld-linux-x86-64.so.2 -path "*$triple*" | head -n1)
+    ld=$(cd "$tree" && find . -name ld-linux-x86-64.so.2 -path "*$triple*" | head -n1)
     [ -n "$ld" ] || die "the unpacked prefix holds no program loader"
-    start="exec \"\$here/root/${ld#./}\" --library-path \"\$libs\" --argv0 \"\$1\" \"\$@\""
+    start="exec \"\$here/tree/${ld#./}\" --library-path \"\$libs\" --argv0 \"\$1\" \"\$@\""
 fi
-lvp=$(cd "$work/prefix" && find root -name libvulkan_lvp.so | head -n1)
+lvp=$(cd "$work/prefix" && find tree -name libvulkan_lvp.so | head -n1)
 [ -n "$lvp" ] || die "the unpacked prefix holds no lavapipe"
 
 # The path is relative to the manifest, so the prefix may be moved.
@@ -72,10 +72,10 @@ cat > "$work/prefix/run" <<RUN
 # run PROGRAM ARGS...
 here=\$(cd "\${0%/*}" && pwd)
 case \$1 in */*) ;; *) program=\$(command -v "\$1") && { shift; set -- "\$program" "\$@"; } ;; esac
-libs=\$here/root/usr/lib/$triple:\$here/root/lib/$triple:/usr/lib/$triple:/lib/$triple\${LD_LIBRARY_PATH:+:\$LD_LIBRARY_PATH}
+libs=\$here/tree/usr/lib/$triple:\$here/tree/lib/$triple:/usr/lib/$triple:/lib/$triple\${LD_LIBRARY_PATH:+:\$LD_LIBRARY_PATH}
 icd=\${WELKIN_ICD:-\$here/lvp.json}
 export WELKIN_PREFIX="\$here" VK_DRIVER_FILES="\$icd" VK_ICD_FILENAMES="\$icd"
-export VK_LAYER_PATH="\$here/root/usr/share/vulkan/explicit_layer.d" VK_LOADER_LAYERS_DISABLE='~implicit~'
+export VK_LAYER_PATH="\$here/tree/usr/share/vulkan/explicit_layer.d" VK_LOADER_LAYERS_DISABLE='~implicit~'
 $start
 RUN
 chmod +x "$work/prefix/run"

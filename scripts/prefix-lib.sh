@@ -4,7 +4,7 @@
 #   target    the folder; it is replaced as a whole, and only when everything has been unpacked
 #   suite     Debian's suite for use_recent
 #
-# and get `work`, a folder for the work that goes when the script ends, with `work/prefix/root` for what is unpacked.
+# and get `work`, a folder for the work that goes when the script ends, with `work/prefix/tree` for what is unpacked.
 # Environment: LVP_MIRROR is the base URI of a Debian archive, LVP_KEYRING a file with its keys.
 # shellcheck shell=sh disable=SC2154
 
@@ -27,7 +27,7 @@ target=$parent/$(basename "$target")
 work=$(mktemp -d "$parent/.unpack.XXXXXX")
 trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM HUP
-mkdir -p "$work/lists/partial" "$work/deb/partial" "$work/prefix/root"
+mkdir -p "$work/lists/partial" "$work/deb/partial" "$work/prefix/tree"
 : > "$work/status"
 
 # apt with private state: the machine's lists, package status and trust store are neither read nor written.
@@ -103,11 +103,11 @@ use_recent() {
 }
 
 # What apt-get has left in work/deb: its libc's version, and whether the machine's is as new. A program needs the newer of
-# the two; the machine's wins a tie, and then the unpacked one is dropped from work/prefix/root.
+# the two; the machine's wins a tie, and then the unpacked one is dropped from work/prefix/tree.
 machine_has_libc() {
     libc=$(basename "$(ls "$work"/deb/libc6_*.deb)") && libc=${libc#libc6_} && libc=${libc%%-*}
     dpkg --compare-versions "$(getconf GNU_LIBC_VERSION | cut -d' ' -f2)" ge "$libc" || return 1
-    dpkg-deb -c "$work"/deb/libc6_*.deb | awk '$1 !~ /^d/ { print $6 }' | while read -r file; do rm -f "$work/prefix/root/$file"; done
+    dpkg-deb -c "$work"/deb/libc6_*.deb | awk '$1 !~ /^d/ { print $6 }' | while read -r file; do rm -f "$work/prefix/tree/$file"; done
 }
 
 # Puts what has been unpacked in place.

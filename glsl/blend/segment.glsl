@@ -2,7 +2,8 @@
 layout(constant_id = 0) const uint LIGHTING = LIGHTING_TABLES;
 layout(constant_id = 1) const uint HOMOGENEOUS = 0;   // 1: density 1 everywhere inside, no table and no detail
 
-// Radius of the ball on which rays look their detail up: of those tried, the largest that draws silhouettes right.
+// Radius of the ball on which rays look their detail up. A smaller one draws truer silhouettes (relative RMSE of a heap's
+// cover 0.30 at 1, 0.22 at 0.7, 0.17 at 0.6, 0.16 at 0.5) and smears the noise over more of the limb.
 const float DETAIL_BALL = 0.6;
 
 // `pixel`: centre of the pixel, as gl_FragCoord.xy has it.

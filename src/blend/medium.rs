@@ -32,7 +32,7 @@ assert_layout!(MediumParams, medium_params, {
 });
 
 /// How often light that one particle of a crowd lends another has been scattered on its way, in round numbers: paths of
-/// the path-traced skies have some 30 events, those of a heap fewer.
+/// the path-traced skies have some 30 events, those of a heap fewer. Not fitted: no truth here absorbs.
 const LENT_SCATTERINGS: i32 = 20;
 
 impl MediumParams {
