@@ -13,7 +13,7 @@
 //   Theta  scattering angle, cos Theta = -dot(to_sun, to_eye), 0 = looking into the sun, [0, π], dense at 0 (∝ t²);
 //   psi    azimuth, about the ray, between the side of the sphere on which the ray runs and the sun, [0, π] by symmetry;
 //   mu     cosine of the zenith angle of the ray at its entry point; the chord is 2 mu radii, b = sqrt(1 - mu²) is the
-//          impact parameter. Below mu = 0.75 placed by the chord's optical depth, evenly to 20 and geometrically beyond,
+//          impact parameter. Below mu = 0.75 placed by the chord's optical depth, evenly to 50 and geometrically beyond,
 //          so that grazing rays of thick spheres are resolved; above evenly in b;
 //   R      optical radius sigma_t · density · radius, evenly in log2.
 // Layout of the 3D image: x = Theta, y = psi, z = level · N_mu + mu; domain ends on texel centres.
@@ -26,7 +26,7 @@
 const float SCATTERING_LEVELS = 29.0;
 const float SCATTERING_R_MIN = 0.4;     // optical radius of level 0
 const float SCATTERING_R_MAX = 102.4;   // optical radius of the last level
-const float SCATTERING_MU_SCALE = 20.0; // optical depth up to which chords are spaced evenly (tuned)
+const float SCATTERING_MU_SCALE = 50.0; // optical depth up to which chords are spaced evenly (tuned)
 const float SCATTERING_MU_SPLIT = 0.75; // mu where even impact parameters begin, and the share of the axis below it
 
 // (Theta, psi, mu) of a ray.
@@ -79,15 +79,16 @@ float single_scattering_model(vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float 
     return sum / scattering_opacity(tau);
 }
 
-// What the mean source function of multiple scattering is nearly proportional to: c / (c + mu), which light scattered once
-// by a thick layer shows for sunlight falling in at cosine c, with the terminator blunted over an optical depth of 4 and a
-// peak forward (Henyey–Greenstein's, g = 0.5). The table holds the quotient, which texels can follow through the crescent
-// of a thick sphere seen against the sun. The albedo scales both alike. (All numbers tuned: least interpolation error.)
+// What the mean source function of multiple scattering is nearly proportional to: the harmonic mean of the cosines at which
+// sunlight falls in and light leaves, c mu / (c + mu / 4), with the terminator blunted as far as the sun shines past the
+// horizon into an optical depth of about one along the ray, and a peak forward. The table holds the quotient, which texels can
+// follow across a thick sphere, crescent and terminator included. The albedo scales it, and bends it little. (All numbers
+// tuned: least interpolation error over media and optical radii.)
 float multiple_scattering_model(vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float mu, float optical_radius) {
-    float cos_sun = dot(entry_us, to_sun_us), width = 4.0 / optical_radius;
-    float lit = cos_sun + sqrt(cos_sun * cos_sun + width * width);
-    float peak = inversesqrt(1.25 - dot(dir_us, to_sun_us));
-    return 0.05 + lit / (lit + 2.0 * mu + 0.05) * 0.75 * peak * peak * peak;
+    float cos_sun = dot(entry_us, to_sun_us), thin = 1.0 / optical_radius;
+    float lit = cos_sun + sqrt(cos_sun * cos_sun + thin * (1.6 * thin + 0.4 * mu));
+    float peak = inversesqrt(1.1 - dot(dir_us, to_sun_us));
+    return 0.1 + lit * (mu + 0.035) / (lit + 0.5 * mu + 0.005) * peak * peak * peak;
 }
 
 // What the table holds at one level: single scattering less its model [1], multiple scattering over its model [1/sr].

@@ -67,7 +67,7 @@ pub const R_MIN: f64 = 0.4;
 /// Optical radius of the last level. Colours are constant beyond.
 pub const R_MAX: f64 = 102.4;
 /// Optical depth up to which chords are spaced evenly, above it geometrically (tuned: least interpolation error).
-pub const MU_SCALE: f64 = 20.0;
+pub const MU_SCALE: f64 = 50.0;
 /// Zenith cosine at which the spacing changes from chords to impact parameters, which then are even: the middle of the
 /// ball, seen from the eye, is a disc like any other. The impact parameter there is 0.66.
 pub const MU_SPLIT: f64 = 0.75;

@@ -79,8 +79,9 @@ pub fn single_scattering_model(ray: &LitRay, optical_radius: f64) -> f64 {
 pub fn multiple_scattering_model(ray: &LitRay, optical_radius: f64) -> f64 {
     let (cos_sun, cos_theta) = (ray.entry.dot(ray.to_sun), ray.dir.dot(ray.to_sun));
     let mu = (-ray.entry.dot(ray.dir)).clamp(0.0, 1.0);
-    let lit = cos_sun + cos_sun.hypot(4.0 / optical_radius);
-    0.05 + lit / (lit + 2.0 * mu + 0.05) * 0.75 * (1.25 - cos_theta).powf(-1.5)
+    let thin = optical_radius.recip();
+    let lit = cos_sun + (cos_sun * cos_sun + thin * (1.6 * thin + 0.4 * mu)).sqrt();
+    0.1 + lit * (mu + 0.035) / (lit + 0.5 * mu + 0.005) * (1.1 - cos_theta).powf(-1.5)
 }
 
 /// Fraction of the beam that leaves after exactly one event: Eq. 9 times the phase function over all rays.
