@@ -42,8 +42,11 @@ struct Bucket {
     crossing: u32,
 }
 
-/// Invocations in a workgroup: `TRANSPORT_BUCKET`.
+/// Invocations in a workgroup of the last pass, and most points in a bucket: `TRANSPORT_BUCKET`.
 const GROUP: u32 = 64;
+
+/// Points or crossings that one invocation works on: `TRANSPORT_EACH`.
+const EACH: u32 = 4;
 
 /// Largest field and radiance arrays of one block of jobs [elements]; bounds memory whatever the resolution.
 const BLOCK_ELEMENTS: usize = 3 << 20;
@@ -311,7 +314,7 @@ impl<'a> DevicePlan<'a> {
             field: &self.field,
         };
         let push = [rays.point_count as u32, self.plan.radii.len() as u32, self.plan.resolution.l_max as u32];
-        rec.dispatch(&self.pipelines.emit, &bindings, &push, [count * GROUP, rays.bucket_count as u32, 1])?;
+        rec.dispatch(&self.pipelines.emit, &bindings, &push, [count * (GROUP / EACH), rays.bucket_count as u32, 1])?;
         let bindings = sweep::Bindings { jobs, rays: &rays.rays, steps: &rays.steps, field: &self.field };
         let widest = block.iter().map(|job| job.j / 2 + 1).max().unwrap_or(1);
         let push = [rays.point_count as u32, rays.ray_count as u32];
@@ -331,7 +334,7 @@ impl<'a> DevicePlan<'a> {
             orders: &self.orders,
         };
         let push = [self.inner.point_count as u32, crossings, self.plan.resolution.l_max as u32];
-        rec.dispatch(&self.pipelines.turn, &bindings, &push, [crossings, 1, count])?;
+        rec.dispatch(&self.pipelines.turn, &bindings, &push, [crossings.div_ceil(EACH), 1, count])?;
         let bindings = project::Bindings {
             jobs,
             components: &self.components,
