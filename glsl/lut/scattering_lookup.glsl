@@ -79,16 +79,16 @@ float single_scattering_model(vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float 
     return sum / scattering_opacity(tau);
 }
 
-// What the mean source function of multiple scattering is nearly proportional to: the harmonic mean of the cosines at which
-// sunlight falls in and light leaves, c mu / (c + mu / 4), with the terminator blunted as far as the sun shines past the
-// horizon into an optical depth of about one along the ray, and a peak forward. The table holds the quotient, which texels can
-// follow across a thick sphere, crescent and terminator included. The albedo scales it, and bends it little. (All numbers
-// tuned: least interpolation error over media and optical radii.)
+// What the mean source function of multiple scattering is nearly proportional to: R / (R + 2), a peak forward, and the
+// harmonic mean of the cosines at which sunlight falls in and light leaves, c mu / (c + mu / 4), with the terminator blunted
+// as far as the sun shines past the horizon into an optical depth of about one along the ray. The table holds the quotient,
+// which texels can follow across a thick sphere, crescent and terminator included. The albedo scales it, and bends it little.
+// (All numbers tuned: least interpolation error over media and optical radii.)
 float multiple_scattering_model(vec3 entry_us, vec3 dir_us, vec3 to_sun_us, float mu, float optical_radius) {
     float cos_sun = dot(entry_us, to_sun_us), thin = 1.0 / optical_radius;
     float lit = cos_sun + sqrt(cos_sun * cos_sun + thin * (1.6 * thin + 0.4 * mu));
-    float peak = inversesqrt(1.1 - dot(dir_us, to_sun_us));
-    return 0.1 + lit * (mu + 0.035) / (lit + 0.5 * mu + 0.005) * peak * peak * peak;
+    float peak = inversesqrt(1.1 - dot(dir_us, to_sun_us)), sum = lit + 0.5 * mu + 0.005;
+    return (0.1 * sum + lit * (mu + 0.035) * peak * peak * peak) / (sum * (1.0 + 2.0 * thin));
 }
 
 // What the table holds at one level: single scattering less its model [1], multiple scattering over its model [1/sr].

@@ -81,7 +81,8 @@ pub fn multiple_scattering_model(ray: &LitRay, optical_radius: f64) -> f64 {
     let mu = (-ray.entry.dot(ray.dir)).clamp(0.0, 1.0);
     let thin = optical_radius.recip();
     let lit = cos_sun + (cos_sun * cos_sun + thin * (1.6 * thin + 0.4 * mu)).sqrt();
-    0.1 + lit * (mu + 0.035) / (lit + 0.5 * mu + 0.005) * (1.1 - cos_theta).powf(-1.5)
+    let sum = lit + 0.5 * mu + 0.005;
+    (0.1 * sum + lit * (mu + 0.035) * (1.1 - cos_theta).powf(-1.5)) / (sum * (1.0 + 2.0 * thin))
 }
 
 /// Fraction of the beam that leaves after exactly one event: Eq. 9 times the phase function over all rays.
