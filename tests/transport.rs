@@ -149,7 +149,7 @@ fn light_takes_the_same_way_back() {
         let (there, back) = (pairing(&a, &transported(&b)), pairing(&b, &transported(&a)));
         let size = pairing(&a, &transported(&a)).abs().max(pairing(&b, &transported(&b)).abs());
         println!("R = {r}, j = {j}: {there:.6} {back:.6} of {size:.6}");
-        // Sources between shells and projections are right to about this (found: 4e-4 at most).
+        // Sources between shells and projections are right to about this (found: 5e-4 at most).
         assert!((there - back).abs() < 1e-3 * size, "R = {r}, j = {j}: {there} {back}, of {size}");
         assert!(there.abs() > 1e-2 * size, "nothing was compared: {there} of {size}");
     }

@@ -22,9 +22,9 @@ const HOST_J: usize = 4;
 
 /// Residual at which a solution counts as converged, relative to the source of second events. The scattered energy then
 /// errs by less than 1e-3 even at the largest optical radius (measured: docs/tables.md). Diffusion, which makes the error
-/// larger than the residual, is a matter of low total angular momenta: for others ten times this is enough.
+/// larger than the residual, is a matter of low total angular momenta: for others thirty times this is enough.
 fn tolerance(j: usize) -> f64 {
-    1e-5 * (j as f64 / 4.0).powi(2).clamp(1.0, 10.0)
+    3e-5 * (j as f64 / 4.0).powi(2).clamp(1.0, 30.0)
 }
 
 /// Applications after which an iteration starts anew from where it is. The slowest, at the largest optical radius, need

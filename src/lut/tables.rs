@@ -17,7 +17,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Raised when the host's part of a computation changes, which the shaders' bytes do not tell.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// How finely tables are resolved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -89,7 +89,7 @@ pub fn impact_parameters(shells: &[f64], optical_radius: f64, gap: f64) -> Vec<f
 }
 
 /// Growth of the angle between neighbouring directions with their elevation over the tangent (tuned).
-const TANGENT_GROWTH: f64 = 0.35;
+const TANGENT_GROWTH: f64 = 0.5;
 
 /// Four-point Lagrange interpolation on ascending nodes: first node and weights. Constant below the first node.
 pub fn interpolation(nodes: &[f64], at: f64) -> (usize, [f64; 4]) {

@@ -2,7 +2,7 @@
 
 use super::basis::{legendre, order_norm, rotation};
 use super::grid::{Ray, impact_parameters, interpolation, shells, step_weights};
-use crate::reference::monte_carlo::Medium;
+use crate::reference::monte_carlo::{Medium, parallel};
 use crate::reference::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 
@@ -34,11 +34,11 @@ impl Resolution {
         let octaves = (optical_radius / 0.5).log2().max(0.0);
         Self {
             l_max,
-            j_max: ((l_max as f64 + 16.0 + 5.0 * octaves) * detail).round() as usize,
-            shells: ((16.0 + 3.5 * octaves) * detail.sqrt()).round() as usize,
+            j_max: (((l_max as f64 + 5.0 + 0.82 * octaves * octaves) * detail).round() as usize).max(l_max),
+            shells: ((15.0 + 3.3 * octaves) * detail.sqrt()).round() as usize,
             finest: 0.02,
-            gap: PI / (1.4 * (l_max as f64 + 4.0)),
-            step: 0.04 / detail,
+            gap: PI / (l_max as f64 + 4.0),
+            step: 0.05 / detail,
         }
     }
 }
@@ -298,18 +298,19 @@ impl Beam {
 /// Weighted least squares: the weights that give each component of the radiance on a shell from its crossings.
 fn projection(rays: &RaySet, shells: usize, lm: &[(usize, usize)], l_max: usize) -> Vec<f64> {
     let lms = lm.len();
-    let mut result = vec![0.0; rays.crossings.len() * lms];
     let fit = l_max + 4;
-    for shell in 0..shells {
-        let mut nodes: Vec<(f64, usize)> = (rays.crossings.iter().enumerate())
-            .filter(|(_, c)| c.0 == shell)
-            .map(|(x, c)| (rays.points[c.1].cos, x))
-            .collect();
-        nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut on_shell = vec![Vec::new(); shells];
+    for (x, &(shell, point)) in rays.crossings.iter().enumerate() {
+        on_shell[shell].push((rays.points[point].cos, x));
+    }
+    on_shell.iter_mut().for_each(|nodes| nodes.sort_by(|a, b| a.0.total_cmp(&b.0)));
+    let rows = parallel(shells, |shell| {
+        let nodes = &on_shell[shell];
         let last = nodes.len() - 1;
         let share: Vec<f64> =
             (0..=last).map(|k| 0.5 * (nodes[(k + 1).min(last)].0 - nodes[k.saturating_sub(1)].0)).collect();
         let tables: Vec<_> = nodes.iter().map(|(mu, _)| legendre(*mu, fit, l_max)).collect();
+        let mut rows = vec![0.0; nodes.len() * lms];
         for m in 0..=l_max {
             let size = fit + 1 - m;
             let y = |k: usize, a: usize| order_norm(m) * tables[k][m + a][m];
@@ -326,9 +327,16 @@ fn projection(rays: &RaySet, shells: usize, lm: &[(usize, usize)], l_max: usize)
                 for (c, _) in lm.iter().enumerate().filter(|(_, lm)| lm.1 == m) {
                     let a = lm[c].0 - m;
                     let sum: f64 = (0..size).map(|b| inverse[a * size + b] * y(k, b)).sum();
-                    result[nodes[k].1 * lms + c] = d * sum;
+                    rows[k * lms + c] = d * sum;
                 }
             }
+        }
+        rows
+    });
+    let mut result = vec![0.0; rays.crossings.len() * lms];
+    for (nodes, rows) in on_shell.iter().zip(&rows) {
+        for ((_, x), row) in nodes.iter().zip(rows.chunks_exact(lms)) {
+            result[x * lms..][..lms].copy_from_slice(row);
         }
     }
     result
