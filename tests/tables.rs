@@ -7,15 +7,18 @@ use std::sync::OnceLock;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, ComputePipeline};
 use welkin::lut::axes::{DENSITY_LEVELS, LEVELS, OpticalDepthShape, R_MAX, R_MIN, STEPS, ScatteringShape};
+use welkin::lut::transport::plan::Resolution;
 use welkin::lut::{Detail, TableParams, Tables};
 use welkin::params::{Clouds, Style};
 use welkin::reference::comparison::{Deviation, random_cases, random_ray};
-use welkin::reference::monte_carlo::{next_uniform, parallel};
+use welkin::reference::monte_carlo::{Medium, next_uniform, parallel};
 use welkin::reference::optical_depth::mean_density;
+use welkin::reference::phase::PhaseFunction;
 use welkin::reference::scattering::{
-    ScatteringLookup, directly_transmitted, opacity, single_fraction, single_scattering,
+    ScatteringLookup, directly_transmitted, multiple_scattering_model, opacity, single_fraction, single_scattering,
 };
 use welkin::reference::sphere::RayCoordinates;
+use welkin::reference::transport::solve;
 use welkin::shaders::probe_scattering_lookup_comp as probe;
 
 fn open() -> Standalone {
@@ -177,6 +180,52 @@ fn look_ups_have_no_bias_at_levels_and_between() {
         let bias = multiple / truth - 1.0;
         println!("R = {r:.2}: bias {:.2} %", 100.0 * bias);
         assert!(bias.abs() < 0.01, "R = {r}: {multiple}, not {truth}");
+    }
+}
+
+#[test]
+fn interpolation_follows_thick_absorbing_balls() {
+    // Look-ups against the solution that their texels come from, both without noise, half-way between texels along mu,
+    // where linear interpolation errs most. With absorption light stays near the surface, and the terminator is sharp.
+    let medium = Medium { phase: PhaseFunction::HenyeyGreenstein, g_sun: 0.9, g: 0.7, albedo: 0.9 };
+    let shape = ScatteringShape::FULL;
+    for level in [24, 28] {
+        let r = ScatteringShape::optical_radius(level);
+        let twice = ScatteringShape { mu: 2 * shape.mu - 1, ..shape };
+        let mus: Vec<f64> = (0..twice.mu).map(|k| twice.coordinates([0, 0, k], r).mu.max(1e-3 / r)).collect();
+        // What is interpolated matters here, not how finely it was solved.
+        let solution = solve(&medium, r, Resolution::for_medium(&medium, r, 0.4), &mus, None);
+        let source = |view: usize, c: RayCoordinates| {
+            let c = RayCoordinates { mu: mus[view], ..c };
+            solution.radiance(view, &c).max(0.0) / opacity(2.0 * r * c.mu)
+        };
+        let model = |view: usize, c: &RayCoordinates| {
+            multiple_scattering_model(&RayCoordinates { mu: mus[view], ..*c }.ray(), r)
+        };
+        let mut state = 23;
+        let pairs: Vec<(f64, f64)> = (0..6000)
+            .map(|_| {
+                let ray = random_ray(&mut state);
+                let texel = shape.texel(&ray, r);
+                let [i, j, k] = [0, 1, 2].map(|a| texel[a] as u32);
+                let (i, j, between) =
+                    (i.min(shape.theta - 2), j.min(shape.psi - 2), 2 * k.min(shape.mu - 2) as usize + 1);
+                let mut sum = 0.0;
+                for corner in 0..8 {
+                    let (x, y, view) =
+                        (i + (corner & 1), j + (corner >> 1 & 1), between + 1 - 2 * (corner >> 2) as usize);
+                    let weight =
+                        (1.0 - (texel[0] - f64::from(x)).abs()) * (1.0 - (texel[1] - f64::from(y)).abs()) * 0.5;
+                    let at = shape.coordinates([x, y, 0], r);
+                    sum += weight * source(view, at) / model(view, &at);
+                }
+                let opacity = opacity(2.0 * r * mus[between]);
+                (sum * model(between, &ray) * opacity, source(between, ray) * opacity)
+            })
+            .collect();
+        let (rms, bias) = errors(&pairs);
+        println!("R = {r:.2}: rms {:.2} %, bias {:+.2} %", 100.0 * rms, 100.0 * bias);
+        assert!(rms < 0.02 && bias.abs() < 0.005, "R = {r}: rms {rms}, bias {bias}");
     }
 }
 
