@@ -312,7 +312,7 @@ impl Renderer {
         rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid, &self.params.clouds))?;
         let (frame_buffer, cloud_base) = (&self.frame[slot], self.cloud_base());
         if self.params.sky.model == SkyModel::Atmosphere {
-            self.shadow.record(rec, &self.tiling, self.set.particles(), frame.camera)?;
+            self.shadow.record(rec, &self.tiling, frame.camera)?;
         }
         self.atmosphere.record_luts(rec, frame_buffer, &frame, &self.shadow, cloud_base)?;
         let (atmosphere, background) = (&self.atmosphere, &self.background);

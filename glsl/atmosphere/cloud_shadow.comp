@@ -11,7 +11,7 @@
 #include "tiling/tile.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, std430) readonly restrict buffer TilingParamsBuffer { TilingParams tiling; } params;
-layout(binding = 1, std430) readonly restrict buffer Particles { Particle particle[]; } particles;
+layout(binding = 1, std430) readonly restrict buffer Occluders { Occluder by[]; } occluders;
 layout(binding = 2, std430) readonly restrict buffer TileHeads { uint head[]; } tile_heads;
 layout(binding = 3, std430) readonly restrict buffer TileNodes { TileNode node[]; } tile_nodes;
 layout(binding = 4, rg16f) writeonly restrict uniform image2D cloud_shadow;

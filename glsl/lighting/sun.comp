@@ -10,7 +10,7 @@
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer TilingParamsBuffer { TilingParams tiling; } params;
-layout(set = 0, binding = 1, std430) readonly restrict buffer Particles { Particle particle[]; } particles;
+layout(set = 0, binding = 1, std430) readonly restrict buffer Occluders { Occluder by[]; } occluders;
 layout(set = 0, binding = 2, std430) readonly restrict buffer TileHeads { uint head[]; } tile_heads;
 layout(set = 0, binding = 3, std430) readonly restrict buffer TileNodes { TileNode node[]; } tile_nodes;
 layout(set = 0, binding = 4, std430) restrict buffer CountersBuffer { Counters count; } counters;
@@ -26,12 +26,12 @@ void main() {
     uint index = linear_index();
     if (index >= counters.count.stored) return;
     uint visited;
-    Particle particle = particles.particle[index];
-    float reach = 1.0 / length(to_unit_ball(particle, vec4(params.tiling.to_sun, 0.0)));
+    Occluder particle = occluders.by[index];
+    float reach = particle.half_chord;
     vec3 optical_depths = sun_optical_depths(particle.centre, reach, index, visited);
     atomicMax(counters.count.longest_walk, visited);
     if (visited > params.tiling.traversal_limit) atomicAdd(counters.count.truncated, 1u);
-    float own = 2.0 * reach * params.tiling.extinction * particle.density * particle.fade;
+    float own = 2.0 * reach * params.tiling.extinction * particle.density;
     SunShares shares = sun_shares(optical_depths, own, push.xi, push.transfer);
     sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, shares.gathered);
 }

@@ -1,29 +1,14 @@
 // Optical depth of cloud between a point and the sun, by walking the list of the point's light tile.
 //
-// The includer declares, under these names, readonly buffers: `params.tiling` (TilingParams), `particles.particle[]`,
+// The includer declares, under these names, readonly buffers: `params.tiling` (TilingParams), `occluders.by[]`,
 // `tile_heads.head[]`, `tile_nodes.node[]`. See lighting/sun.comp.
 //
 // Each occluder counts with its own extinction, density and fade. (Yusov's released code scales it by the receiver's
 // density; src/reference/lighting.rs tests that we do not.)
 #ifndef WELKIN_LIGHTING_SUN_OPTICAL_DEPTH
 #define WELKIN_LIGHTING_SUN_OPTICAL_DEPTH
+#include "tiling/occluder.glsl"
 #include "tiling/tile.glsl"
-
-// Lengths of the ray's way through the ellipsoid in front of three points on it: `reach` ahead of its start, the start,
-// and `reach` behind it [m].
-vec3 chords_ahead(Particle p, vec3 start, vec3 direction, float reach) {
-    vec3 o_us = to_unit_ball(p, vec4(start, 1.0));
-    vec3 d_us = to_unit_ball(p, vec4(direction, 0.0));
-    // |o + t d|² = 1. The nearest point to the centre is found first: its distance does not cancel.
-    float dd = dot(d_us, d_us);
-    float t_nearest = -dot(o_us, d_us) / dd;
-    vec3 nearest = o_us + t_nearest * d_us;
-    float inside = 1.0 - dot(nearest, nearest);
-    if (inside <= 0.0) return vec3(0.0);
-    float half_chord = sqrt(inside / dd);
-    vec3 from = vec3(reach, 0.0, -reach);
-    return max(t_nearest + half_chord - from, 0.0) - max(t_nearest - half_chord - from, 0.0);
-}
 
 // Moves a point below the clouds along the light up to the base of the slab: nothing lies between, and the lists hold
 // what shades receivers inside the slab. Two steps, because the base follows the planet's curvature.
@@ -39,24 +24,33 @@ vec3 lift_to_slab(vec3 p_ws, in TilingParams t) {
 
 // At three points on the ray through `p_ws` towards the sun: `reach` ahead of it, there, and `reach` behind.
 // `self`: a particle that does not occlude (NO_NODE: none). `visited`: nodes looked at; beyond the limit, the rest of the
-// list was left out.
+// list was left out. Most nodes miss the point: `bounds` tells without a look at the occluder.
 vec3 sun_optical_depths(vec3 p_ws, float reach, uint self, out uint visited) {
     visited = 0u;
     vec3 start = lift_to_slab(p_ws, params.tiling);
-    uint tile = receiver_tile(start, params.tiling);
+    uint receiver;
+    uint tile = receiver_tile(start, params.tiling, receiver);
     if (tile == NO_NODE) return vec3(0.0);
-    float depth = light_depth(start, params.tiling);
     vec3 sum = vec3(0.0);
+    // Copies: a driver need not know that the loop reads the same each time.
+    vec3 u_axis = params.tiling.u_axis, v_axis = params.tiling.v_axis, to_sun = params.tiling.to_sun;
+    float farthest = reach + params.tiling.greatest_extent + 0.5; // sorted by depths that are rounded in another way
+    uint limit = params.tiling.traversal_limit;
     uint node = tile_heads.head[tile];
-    while (node != NO_NODE && ++visited <= params.tiling.traversal_limit) {
-        TileNode entry = tile_nodes.node[node];
-        // Front to back: from here on everything lies behind the receiver.
-        if (key_depth(entry.key) < depth - reach - params.tiling.greatest_extent) break;
-        if (entry.particle != self) {
-            Particle p = particles.particle[entry.particle];
-            sum += p.density * p.fade * chords_ahead(p, start, params.tiling.to_sun, reach);
+    visited = tile >> 31u; // 0, which compilers do not see: a count that lanes share, lavapipe keeps in memory
+    while (node != NO_NODE && ++visited <= limit) {
+        uint next = tile_nodes.node[node].next;
+        if (in_bounds(receiver, tile_nodes.node[node].bounds)) {
+            uint occluder = tile_nodes.node[node].particle;
+            Occluder o = occluders.by[occluder];
+            vec3 away = start - o.centre;
+            vec3 offset = vec3(dot(away, u_axis), dot(away, v_axis), dot(away, to_sun));
+            float density = occluder == self ? 0.0 : o.density;
+            sum += density * chords_ahead(o, offset, reach);
+            // Front to back: from here on everything lies behind the receiver.
+            if (offset.z > farthest) next = NO_NODE;
         }
-        node = entry.next;
+        node = next;
     }
     return params.tiling.extinction * sum;
 }

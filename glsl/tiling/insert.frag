@@ -19,7 +19,10 @@ layout(location = 0) flat in uint particle_index;
 void main() {
     uvec2 pixel = uvec2(gl_FragCoord.xy);
     uint tile = pixel.y * params.tiling.tile_dim + pixel.x;
-    uint key = light_key(light_depth(particles.particle[particle_index].centre, params.tiling));
+    Particle p = particles.particle[particle_index];
+    uint key = light_key(light_depth(p.centre, params.tiling));
+    uint level = pixel.y / params.tiling.tile_dim;
+    uint bounds = pack_bounds(footprint(p, level, params.tiling), ivec2(pixel.x, pixel.y % params.tiling.tile_dim));
     uint slot = atomicAdd(counters.count.tile_nodes, 1u); // counts past capacity
     bool fits = slot < params.tiling.node_capacity;
     uint next = NO_NODE;
@@ -29,5 +32,5 @@ void main() {
         tile_heads.head[tile] = slot;
     }
     endInvocationInterlockARB();
-    if (fits) tile_nodes.node[slot] = TileNode(particle_index, next, key);
+    if (fits) tile_nodes.node[slot] = TileNode(next, bounds, particle_index, key);
 }

@@ -18,7 +18,7 @@ void main() {
         if (in_level(p, level, params.tiling) && skip-- == 0u) break;
     }
     if (level == levels) return;
-    TileRange tiles = particle_tiles(p, level, params.tiling);
+    TileRange tiles = footprint_tiles(footprint(p, level, params.tiling), params.tiling);
     if (any(lessThan(tiles.greatest, tiles.least))) return;
     ivec2 corner = ivec2(gl_VertexIndex & 1, gl_VertexIndex >> 1);
     ivec2 tile = mix(tiles.least, tiles.greatest + 1, equal(corner, ivec2(1)));

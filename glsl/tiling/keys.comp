@@ -4,6 +4,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "tiling/tile.glsl"
+#include "tiling/occluder.glsl"
 #include "grid/counters.glsl"
 #include "compact/index.glsl"
 layout(local_size_x = 64) in;
@@ -13,12 +14,15 @@ layout(set = 0, binding = 1, std430) readonly restrict buffer Particles { Partic
 layout(set = 0, binding = 2, std430) readonly restrict buffer CountersBuffer { Counters count; } counters;
 layout(set = 0, binding = 3, std430) writeonly restrict buffer Keys { uint key[]; } keys;
 layout(set = 0, binding = 4, std430) writeonly restrict buffer Indices { uint index[]; } indices;
+layout(set = 0, binding = 5, std430) writeonly restrict buffer Occluders { Occluder by[]; } occluders;
 
 void main() {
     uint index = linear_index();
     uint count = counters.count.stored;
     if (index >= count) return;
     uint slot = count - 1u - index;
-    keys.key[slot] = ~light_key(light_depth(particles.particle[index].centre, params.tiling));
+    Particle p = particles.particle[index];
+    occluders.by[index] = occluder_of(p, params.tiling);
+    keys.key[slot] = ~light_key(light_depth(p.centre, params.tiling));
     indices.index[slot] = index;
 }

@@ -29,9 +29,21 @@ struct TilingParams {
 
 // One occluder in one tile's list.
 struct TileNode {
+    uint next;     // NO_NODE ends a list
+    uint bounds;   // what it covers of the tile: pack_bounds in tiling/tile.glsl
     uint particle;
-    uint next; // NO_NODE ends a list
-    uint key;  // sorts what is nearest the light first
+    uint key;      // sorts what is nearest the light first
+};
+
+// A particle as the light meets it. Where light passes the centre at (u, v) along u_axis and v_axis [m], its way through
+// the ellipsoid is 2 half_chord √(1 - q), q = (outline.x u + outline.y v)² + (outline.z v)²; the way's middle lies
+// dot(shear, (u, v)) metres farther from the light than the centre. See tiling/occluder.glsl.
+struct Occluder {
+    vec3 centre;      // [m, floating origin]
+    float half_chord; // along the light, through the centre [m]
+    vec3 outline;     // [1/m]
+    float density;    // relative density · fade
+    vec2 shear;       // [1]
 };
 
 #endif

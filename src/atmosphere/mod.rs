@@ -5,7 +5,7 @@
 //! let background = Background::new(&gpu, model, extent, downscale, precision)?;
 //! let mut shadow = CloudShadow::new(&gpu)?;
 //! // every frame, `frame` being the FrameParams buffer:
-//! shadow.record(rec, &tiling, particles, camera)?;                // after `tiling`; optional
+//! shadow.record(rec, &tiling, camera)?;                           // after `tiling`; optional
 //! atmosphere.record_luts(rec, &frame, &frame_params, &shadow, cloud_base)?; // fills atmosphere.sky_light()
 //! background.record_opaque(rec, &atmosphere, &frame)?;            // before `blend`: fills background.low_opaque
 //! background.record(rec, &atmosphere, &frame, &shadow, cloud_base)?; // fills background.radiance

@@ -1,7 +1,7 @@
 //! Shadows of the clouds on the ground.
 
 use crate::Result;
-use crate::gpu::{Buffer, ComputePipeline, Gpu, Image, ImageDesc, Recorder};
+use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Recorder};
 use crate::shaders::atmosphere_cloud_shadow_comp as shader;
 use crate::shared::assert_layout;
 use crate::tiling::Tiling;
@@ -56,17 +56,11 @@ impl CloudShadow {
     }
 
     /// Walks the light tiles of this frame, `camera` being relative to the floating origin.
-    pub fn record(
-        &mut self,
-        rec: &mut Recorder<'_>,
-        tiling: &Tiling,
-        particles: &Buffer,
-        camera: [f32; 3],
-    ) -> Result<()> {
+    pub fn record(&mut self, rec: &mut Recorder<'_>, tiling: &Tiling, camera: [f32; 3]) -> Result<()> {
         (self.centre, self.extent) = ([camera[0], camera[2]], SHADOW_EXTENT);
         let bindings = shader::Bindings {
             params: tiling.params(rec.slot()),
-            particles,
+            occluders: tiling.occluders(),
             tile_heads: tiling.heads(),
             tile_nodes: tiling.nodes(),
             cloud_shadow: &self.image,

@@ -95,7 +95,7 @@ impl Lighting {
             &self.sun,
             &sun::Bindings {
                 params: tiling.params(slot),
-                particles: set.particles(),
+                occluders: tiling.occluders(),
                 tile_heads: tiling.heads(),
                 tile_nodes: tiling.nodes(),
                 counters: set.counters(),

@@ -56,8 +56,8 @@ impl Interlocked {
         buffer: &Buffer,
         params: &TilingParams,
         set: &ParticleSet,
-        tile_heads: &Buffer,
-        tile_nodes: &Buffer,
+        (tile_heads, tile_nodes): (&Buffer, &Buffer),
+        occluders: &Buffer,
     ) -> Result<()> {
         assert!(set.capacity() <= self.capacity, "the particle set has grown: call grow() too");
         let counters = set.counters();
@@ -71,6 +71,7 @@ impl Interlocked {
                 counters,
                 keys: &self.keys,
                 indices: &self.order,
+                occluders,
             },
             &(),
             set.args(),

@@ -23,7 +23,7 @@ use crate::shaders::{tiling_bin_comp as bin, tiling_order_comp as order_lists};
 
 use interlock::Interlocked;
 
-pub use params::{Slab, TileNode, TilingParams};
+pub use params::{Occluder, Slab, TileNode, TilingParams};
 
 /// How the lists come to be in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +47,8 @@ pub struct Tiling {
     params: Vec<Buffer>,
     heads: Buffer,
     nodes: Buffer,
+    occluders: Buffer,
+    particles: u32,
     levels: u32,
     node_capacity: u32,
 }
@@ -87,6 +89,8 @@ impl Tiling {
             params,
             heads: Buffer::array::<u32>(gpu, "tile heads", tiles as usize)?,
             nodes: Buffer::array::<TileNode>(gpu, "tile nodes", node_capacity as usize)?,
+            occluders: Buffer::array::<Occluder>(gpu, "occluders", particles as usize)?,
+            particles,
             levels,
             node_capacity,
         })
@@ -110,6 +114,12 @@ impl Tiling {
         &self.nodes
     }
 
+    /// What the light meets of every stored particle ([`Occluder`]).
+    #[must_use]
+    pub fn occluders(&self) -> &Buffer {
+        &self.occluders
+    }
+
     /// Nodes that fit.
     #[must_use]
     pub fn node_capacity(&self) -> u32 {
@@ -119,9 +129,13 @@ impl Tiling {
     /// Makes room for more nodes and more particles if the last frame wanted them; the device must be idle. True if it
     /// did.
     pub fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters, set: &ParticleSet) -> Result<bool> {
-        let mut grew = false;
+        let mut grew = set.capacity() > self.particles;
+        if grew {
+            self.particles = set.capacity();
+            self.occluders = Buffer::array::<Occluder>(gpu, "occluders", self.particles as usize)?;
+        }
         if let Insertion::Interlock(interlocked) = &mut self.insertion {
-            grew = interlocked.grow(gpu, set.capacity())?;
+            grew |= interlocked.grow(gpu, set.capacity())?;
         }
         if counters.tile_nodes > self.node_capacity {
             self.node_capacity = grown(counters.tile_nodes);
@@ -134,13 +148,14 @@ impl Tiling {
     /// Records insertion and ordering of all stored particles.
     pub fn record(&self, rec: &mut Recorder<'_>, params: &TilingParams, set: &ParticleSet) -> Result<()> {
         assert!(params.level_count <= self.levels, "the tiling was made for fewer levels");
+        assert!(set.capacity() <= self.particles, "the particle set has grown: call grow() too");
         let params = TilingParams { node_capacity: self.node_capacity, ..*params };
         let buffer = &self.params[rec.slot()];
         buffer.write(0, &[params]);
         rec.fill_buffer(&self.heads, 0, self.heads.size(), params::NO_NODE);
         match &self.insertion {
             Insertion::Interlock(interlocked) => {
-                interlocked.record(rec, buffer, &params, set, &self.heads, &self.nodes)
+                interlocked.record(rec, buffer, &params, set, (&self.heads, &self.nodes), &self.occluders)
             }
             Insertion::Sort { bin, order } => {
                 rec.dispatch_indirect(
@@ -151,6 +166,7 @@ impl Tiling {
                         counters: set.counters(),
                         tile_heads: &self.heads,
                         tile_nodes: &self.nodes,
+                        occluders: &self.occluders,
                     },
                     &(),
                     set.args(),

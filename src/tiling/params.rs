@@ -67,14 +67,40 @@ assert_layout!(TilingParams, tiling_params, {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct TileNode {
-    /// The particle.
-    pub particle: u32,
     /// Next node, or [`NO_NODE`].
     pub next: u32,
+    /// What the particle covers of the tile, in 128ths of its edges: least u, least v, 127 - greatest u, 127 - greatest v,
+    /// 8 bits each.
+    pub bounds: u32,
+    /// The particle.
+    pub particle: u32,
     /// Sorts what is nearest the light first.
     pub key: u32,
 }
-assert_layout!(TileNode, tile_node, { particle: PARTICLE, next: NEXT, key: KEY });
+assert_layout!(TileNode, tile_node, { particle: PARTICLE, next: NEXT, key: KEY, bounds: BOUNDS });
+
+/// How a particle dims light that passes it (`glsl/tiling/params.glsl`): lengths of ways through an ellipsoid along the
+/// light, by where they pass its centre.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Occluder {
+    /// Centre, relative to the floating origin [m].
+    pub centre: [f32; 3],
+    /// Half the way along the light through the centre [m].
+    pub half_chord: f32,
+    /// Maps a place in the plane perpendicular to the light, relative to the centre, such that the ellipsoid's outline
+    /// becomes the unit circle [1/m]: (x u + y v, z v).
+    pub outline: [f32; 3],
+    /// Relative density · fade.
+    pub density: f32,
+    /// Metres by which the middle of a way moves away from the light per metre along u and v.
+    pub shear: [f32; 2],
+    /// Not used.
+    pub unused: [u32; 2],
+}
+assert_layout!(Occluder, occluder, {
+    centre: CENTRE, half_chord: HALF_CHORD, outline: OUTLINE, density: DENSITY, shear: SHEAR,
+});
 
 /// The layer of cloud that the tiles have to cover.
 #[derive(Clone, Copy, Debug, PartialEq)]
