@@ -27,7 +27,7 @@ pub use crate::frame::TableImages;
 pub const PLANET_RADIUS: f64 = 6.36e6;
 
 /// Light list nodes to begin with, per particle that fits.
-const NODES_PER_PARTICLE: u32 = 10;
+const NODES_PER_PARTICLE: u32 = 7;
 
 /// Where the particles come from.
 enum Particles {
