@@ -150,6 +150,9 @@
 //! - **Lists are the same with and without interlock**: without it, insertion by atomic exchange and a merge sort. CPU devices
 //!   sort although they have it, because that is faster there.
 //!   (`tests/oracle_tiling.rs::lists_are_the_same_however_they_are_ordered`)
+//! - **Nodes know what part of their tile they cover**, and particles are reduced along the light once a frame: four in five
+//!   nodes of a walk miss, at one comparison each. Twice as fast on lavapipe.
+//!   (`tests/oracle_lighting.rs::long_thin_occluders_far_away_are_as_exact_as_near_ones`)
 //! - **An occluder counts with its own density**, not with the receiver's†.
 //!   (`tests/oracle_lighting.rs::an_occluder_counts_with_its_own_density`)
 //! - **Light is found at three points of a particle**, both poles towards the sun and the centre: overlapping particles agree on

@@ -9,7 +9,7 @@
 //!
 //! Two ways to the same lists ([`ListOrder`]): sorted particles rasterized under fragment shader interlock, or insertion by
 //! atomic exchange in arbitrary order and a merge sort of each list's links. Either way the lists are a function of the
-//! particles alone.
+//! particles alone. Nodes hold what the particle covers of the tile, [`Occluder`]s what a walk needs of a particle.
 
 mod interlock;
 pub mod params;
