@@ -9,7 +9,7 @@
 #define WELKIN_LUT_TRANSPORT_GLSL
 
 const uint TRANSPORT_ORDERS = 33u;   // largest l_max + 1
-const uint TRANSPORT_BUCKET = 64u;   // most points in a bucket
+const uint TRANSPORT_BUCKET = 128u;  // most points in a bucket
 const uint TRANSPORT_EACH = 4u;      // points that one invocation works on, so that what it reads of matrices serves all
 
 struct TransportJob {

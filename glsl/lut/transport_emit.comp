@@ -26,7 +26,8 @@ void main() {
     // Jobs come first, so that the basis of a bucket stays in a cache until all have used it.
     TransportJob job = jobs.at[gl_WorkGroupID.x];
     TransportBucket bucket = buckets.at[gl_WorkGroupID.y];
-    uvec4 index = gl_LocalInvocationID.x + uvec4(0u, 1u, 2u, 3u) * gl_WorkGroupSize.x;
+    uvec4 index = gl_LocalInvocationID.x * TRANSPORT_EACH + uvec4(0u, 1u, 2u, 3u);
+    if (index.x >= bucket.count) return;
     uvec4 place = bucket.start + min(index, bucket.count - 1u);
     uvec4 p = uvec4(order.at[place.x], order.at[place.y], order.at[place.z], order.at[place.w]);
 

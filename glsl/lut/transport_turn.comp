@@ -16,7 +16,8 @@ layout(push_constant) uniform TurnPush { uint point_count; uint crossing_count; 
 const uint BLOCK = 8u;   // orders that are summed at once; even
 
 void main() {
-    uvec4 index = gl_WorkGroupID.x * (TRANSPORT_EACH * gl_WorkGroupSize.x) + gl_LocalInvocationID.x + uvec4(0u, 1u, 2u, 3u) * gl_WorkGroupSize.x;
+    uvec4 index = gl_GlobalInvocationID.x * TRANSPORT_EACH + uvec4(0u, 1u, 2u, 3u);
+    if (index.x >= crossing_count) return;
     bvec4 mine = lessThan(index, uvec4(crossing_count));
     uvec4 x = min(index, crossing_count - 1u);
     TransportJob job = jobs.at[gl_GlobalInvocationID.z];

@@ -42,8 +42,11 @@ struct Bucket {
     crossing: u32,
 }
 
-/// Invocations in a workgroup of the last pass, and most points in a bucket: `TRANSPORT_BUCKET`.
+/// Invocations in a workgroup of the last pass.
 const GROUP: u32 = 64;
+
+/// Most points in a bucket: `TRANSPORT_BUCKET`.
+const BUCKET: u32 = 128;
 
 /// Points or crossings that one invocation works on: `TRANSPORT_EACH`.
 const EACH: u32 = 4;
@@ -98,7 +101,7 @@ impl GpuRays {
         let mut start = 0;
         for alike in order.chunk_by(|&a, &b| places[a as usize] == places[b as usize]) {
             let (shell, crossing) = places[alike[0] as usize];
-            for bucket in alike.chunks(GROUP as usize) {
+            for bucket in alike.chunks(BUCKET as usize) {
                 let count = bucket.len() as u32;
                 buckets.push(Bucket { start, count, shell: shell as u32, crossing: u32::from(crossing) });
                 start += count;
@@ -314,7 +317,7 @@ impl<'a> DevicePlan<'a> {
             field: &self.field,
         };
         let push = [rays.point_count as u32, self.plan.radii.len() as u32, self.plan.resolution.l_max as u32];
-        rec.dispatch(&self.pipelines.emit, &bindings, &push, [count * (GROUP / EACH), rays.bucket_count as u32, 1])?;
+        rec.dispatch(&self.pipelines.emit, &bindings, &push, [count * (BUCKET / EACH), rays.bucket_count as u32, 1])?;
         let bindings = sweep::Bindings { jobs, rays: &rays.rays, steps: &rays.steps, field: &self.field };
         let widest = block.iter().map(|job| job.j / 2 + 1).max().unwrap_or(1);
         let push = [rays.point_count as u32, rays.ray_count as u32];
