@@ -38,19 +38,25 @@ vec3 sun_optical_depths(vec3 p_ws, float reach, uint self, out uint visited) {
     uint limit = params.tiling.traversal_limit;
     uint node = tile_heads.head[tile];
     visited = tile >> 31u; // 0, which compilers do not see: a count that lanes share, lavapipe keeps in memory
-    while (node != NO_NODE && ++visited <= limit) {
-        uint next = tile_nodes.node[node].next;
-        if (in_bounds(receiver, tile_nodes.node[node].bounds)) {
-            uint occluder = tile_nodes.node[node].particle;
-            Occluder o = occluders.by[occluder];
-            vec3 away = start - o.centre;
-            vec3 offset = vec3(dot(away, u_axis), dot(away, v_axis), dot(away, to_sun));
-            float density = occluder == self ? 0.0 : o.density;
-            sum += density * chords_ahead(o, offset, reach);
-            // Front to back: from here on everything lies behind the receiver.
-            if (offset.z > farthest) next = NO_NODE;
+    while (node != NO_NODE && visited <= limit) {
+        // Up to three nodes that miss in one go: more lanes of a subgroup then have an occluder to look at together.
+        uint at = node;
+        bool hit = false;
+        for (int i = 0; i < 3; ++i) {
+            if (hit || node == NO_NODE || ++visited > limit) continue;
+            at = node;
+            hit = in_bounds(receiver, tile_nodes.node[at].bounds);
+            node = tile_nodes.node[at].next;
         }
-        node = next;
+        if (!hit) continue;
+        uint occluder = tile_nodes.node[at].particle;
+        Occluder o = occluders.by[occluder];
+        vec3 away = start - o.centre;
+        vec3 offset = vec3(dot(away, u_axis), dot(away, v_axis), dot(away, to_sun));
+        float density = occluder == self ? 0.0 : o.density;
+        sum += density * chords_ahead(o, offset, reach);
+        // Front to back: from here on everything lies behind the receiver.
+        if (offset.z > farthest) node = NO_NODE;
     }
     return params.tiling.extinction * sum;
 }
