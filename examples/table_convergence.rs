@@ -17,7 +17,7 @@ use welkin::reference::scattering::ScatteringLookup;
 
 const RAYS: usize = 200;
 /// Density levels that are shown, and how many walks a ray gets on average there.
-const SHOWN: [(u32, u32); 4] = [(1, 1500), (3, 3000), (5, 4000), (7, 2500)];
+const SHOWN: [(u32, u32); 4] = [(1, 4000), (3, 8000), (5, 10_000), (7, 6000)];
 
 /// Rays of one optical radius with what Monte Carlo found there.
 struct Truth {

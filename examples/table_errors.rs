@@ -1,7 +1,7 @@
 //! The study behind docs/table-errors.md: full tables of each medium against Monte Carlo and quadrature, at every density
 //! level and between, and where their light goes. Prints Markdown.
 //!
-//! `scripts/table-errors [DIR]` runs it; DIR keeps the tables (about 40 CPU-seconds each without a GPU).
+//! `scripts/table-errors [DIR]` runs it; DIR keeps the tables (26 to 59 CPU-seconds each without a GPU).
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
