@@ -89,7 +89,7 @@
 //! | [`grid`] | nested rings of cells around the camera → valid cells → particles; or an explicit list |
 //! | [`compact`] | visible particles, in order, sorted back to front, into an indirect draw |
 //! | [`tiling`] | lists of occluders per light-space tile, front to back along the light |
-//! | [`lighting`] | sunlight that reaches each particle, smoothed through the cloud's body; skylight |
+//! | [`lighting`] | sunlight that reaches each particle; what they scatter, diffusing through all of them; skylight |
 //! | [`atmosphere`] | clear air: tables, light on clouds and ground, sky and ground behind, cloud shadows |
 //! | [`blend`] | particles → segments of view rays → radiance, transmittance, nearest distance |
 //! | [`film`] | air in front of the clouds, edge-preserving upsampling, compositing, exposure and tone curve |
@@ -157,10 +157,12 @@
 //!   (`tests/oracle_lighting.rs::an_occluder_counts_with_its_own_density`)
 //! - **Light is found at three points of a particle**, both poles towards the sun and the centre: overlapping particles agree on
 //!   the light between them. (`tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height` checks all three)
-//! - **Sunlight fades among particles as diffusion lets it**, 1 / (1 + ξ τ), with τ counted per particle of a crowd, and a
-//!   crowd's members lend each other light, which is flat (`glsl/lighting/transfer.glsl`); only what comes straight from the sun fades as exp(−τ).
-//!   The paper dims all of it by exp(−ξ τ), which is an option (`clouds.transfer`). Fitted to path-traced clouds: `docs/accuracy.md`
-//!   tells the gain. (`src/reference/lighting.rs::alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less`,
+//! - **Light that particles scatter diffuses through all of them**: the diffusion equation is solved in voxels around the
+//!   camera, and shading looks its solution up where the eye looks (`docs/lighting.md`). In the paper particles see each other
+//!   as occluders only. (`tests/light_volume.rs`)
+//! - **Sunlight for a particle's own scattering fades as diffusion lets it**, 1 / (1 + ξ τ), and what comes straight from the sun
+//!   as exp(−τ). The paper dims all of it by exp(−ξ τ), which is an option (`clouds.transfer`) that does without the voxels.
+//!   `docs/accuracy.md` tells what both gain against path tracing. (`src/reference/lighting.rs::alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less`,
 //!   `tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height`)
 //! - **No smoothing by default**: against path tracing it gains nothing once light fades as above.
 //!   (`tests/oracle_lighting.rs::smoothing_and_skylight_are_those_of_the_reference`)

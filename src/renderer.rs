@@ -15,7 +15,10 @@ use crate::frame::{FrameInputs, FrameOutput, assert_size};
 use crate::gpu::{Buffer, BufferKind, Gpu, Image, ImageDesc, Recorder};
 use crate::grid::{CounterReadback, Counters, Grid, GridDesign, ParticleList, ParticleSet};
 use crate::lighting::Lighting;
-use crate::params::{Camera, Lighting as LightingKind, Params, SkyModel, Source, Style, Sun, SunPosition};
+use crate::lighting::volume::{LightVolume, Place, VolumeDesign, VolumeMedium};
+use crate::params::{
+    Camera, Clouds, Lighting as LightingKind, Params, Quality, SkyModel, Source, Style, Sun, SunPosition, Transfer,
+};
 use crate::shared::FrameParams;
 use crate::tiling::{Slab, Tiling, TilingParams};
 use ash::vk;
@@ -46,6 +49,7 @@ pub struct Renderer {
     compact: Compact,
     tiling: Tiling,
     lighting: Lighting,
+    volume: LightVolume,
     detail: DetailTile,
     detail_filled: bool,
     blender: Blender,
@@ -121,6 +125,7 @@ impl Renderer {
             compact: Compact::new(gpu, set.capacity())?,
             tiling: Tiling::new(gpu, levels, set.capacity(), set.capacity().saturating_mul(NODES_PER_PARTICLE), slots)?,
             lighting: Lighting::new(gpu, set.capacity())?,
+            volume: LightVolume::new(gpu, volume_design(&particles, &params.clouds, quality), slots)?,
             detail: DetailTile::new(gpu)?,
             detail_filled: false,
             blender: Blender::new(gpu, choice.used, shading, low_extent, quality.precision)?,
@@ -241,6 +246,8 @@ impl Renderer {
             scattering_lut: tables.scattering,
             detail_tile: &self.detail.image,
             opaque_distance: &self.background.low_opaque,
+            volume: self.volume.params(rec.slot()),
+            light_volume: self.volume.image(),
             draw_args: self.compact.args(),
             draw_args_offset: Compact::DRAW_ARGS,
             counters: self.set.counters(),
@@ -309,7 +316,23 @@ impl Renderer {
             Particles::Grid(grid, _) => Some(&**grid),
             Particles::List(_) => None,
         };
-        rec.pass("lighting", |rec| self.lighting.record(rec, &self.tiling, set, grid, &self.params.clouds))?;
+        let clouds = &self.params.clouds;
+        rec.pass("lighting", |rec| {
+            self.lighting.record(rec, &self.tiling, set, grid, clouds, self.volume.voxel_edge())
+        })?;
+        if clouds.lighting == LightingKind::Tables && clouds.transfer == Transfer::Diffusion {
+            let place = Place {
+                centre: slab.centre.map(f64::from),
+                origin,
+                base: f64::from(slab.base),
+                planet_radius: 0.5 / f64::from(slab.inverse_diameter),
+                to_sun,
+            };
+            let medium = VolumeMedium::new(clouds, fill);
+            rec.pass("light volume", |rec| self.volume.record(rec, &place, &medium, set, self.lighting.sun_depths()))?;
+        } else {
+            self.volume.record_none(rec);
+        }
         let (frame_buffer, cloud_base) = (&self.frame[slot], self.cloud_base());
         if self.params.sky.model == SkyModel::Atmosphere {
             self.shadow.record(rec, &self.tiling, frame.camera)?;
@@ -427,4 +450,22 @@ impl Renderer {
 pub(crate) fn floating_origin(near: [f64; 3]) -> [f64; 3] {
     let snap = |x: f64| (x / 1024.0).round() * 1024.0;
     [snap(near[0]), 0.0, snap(near[2])]
+}
+
+/// Voxels for the light of the scene's particles: few where nothing diffuses.
+fn volume_design(particles: &Particles, clouds: &Clouds, quality: &Quality) -> VolumeDesign {
+    match particles {
+        _ if clouds.lighting != LightingKind::Tables || clouds.transfer != Transfer::Diffusion => VolumeDesign::none(),
+        Particles::Grid(_, design) => VolumeDesign::of_layer(
+            design.cell_edge(),
+            quality.cells,
+            f64::from(clouds.particle_cutoff),
+            f64::from(clouds.thickness),
+        ),
+        Particles::List(list) => {
+            let [least, greatest] = list.bounds();
+            let extent = std::array::from_fn(|axis| greatest[axis] - least[axis]);
+            VolumeDesign::of_list(extent, f64::from(list.greatest_extent()))
+        }
+    }
 }

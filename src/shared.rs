@@ -45,22 +45,21 @@ assert_layout!(Particle, particle, {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ParticleLight {
-    /// Share of the sunlight that feeds what the particle scatters many times, at the pole facing the sun, the centre and
-    /// the far pole; above 1 in the depth of a crowd.
+    /// Share of the sunlight that feeds what the particle itself scatters many times, at the pole facing the sun, the
+    /// centre and the far pole, 0 to 1.
     pub diffuse: [f32; 3],
     /// How much of its half-sphere above is sky and not neighbouring cloud, 0 to 1.
     pub ambient: f32,
     /// Share of the sunlight that comes straight from the sun, at the same points, 0 to 1.
     pub direct: [f32; 3],
-    /// Radiance that the particle's neighbours lend it, per irradiance of the sun [1/sr], from 0 to
-    /// [`GATHERED`](crate::lighting::GATHERED).
-    pub gathered: f32,
+    /// How much the particle sees of what its neighbours scatter: 0 alone, 1 in the depth of a crowd.
+    pub crowd: f32,
 }
-assert_layout!(ParticleLight, particle_light, { diffuse: DIFFUSE, ambient: AMBIENT, direct: DIRECT, gathered: GATHERED });
+assert_layout!(ParticleLight, particle_light, { diffuse: DIFFUSE, ambient: AMBIENT, direct: DIRECT, crowd: CROWD });
 
 impl ParticleLight {
     /// Nothing between the particle and the sun, nor the sky.
-    pub const OPEN: Self = Self { diffuse: [1.0; 3], ambient: 1.0, direct: [1.0; 3], gathered: 0.0 };
+    pub const OPEN: Self = Self { diffuse: [1.0; 3], ambient: 1.0, direct: [1.0; 3], crowd: 0.0 };
 }
 
 /// The view, the sun and the medium of one frame (`glsl/common/frame.glsl`).

@@ -3,7 +3,7 @@
 #[path = "support/clouds.rs"]
 mod clouds;
 
-use clouds::{Setup, Stages, open, read, silent};
+use clouds::{Setup, Stages, VOXEL, open, read, silent};
 use glam::{DQuat, DVec3, EulerRot};
 use welkin::gpu::Feature;
 use welkin::grid::{ParticleList, ParticleSet};
@@ -44,9 +44,10 @@ fn no_occluder_is_missed_whatever_the_suns_height() {
             let p = &particles[index];
             let own = 2.0 * pole.length() * extinction * f64::from(p.density) * f64::from(p.fade);
             let clouds = &setup.clouds;
-            let SunShares { diffuse, gathered, direct } = sun_shares(tau, own, clouds.xi.into(), clouds.transfer);
-            let got = f64::from(device_values[index].gathered);
-            assert!((got - gathered).abs() < 1e-3, "{elevation}°, particle {index}: {got}, expected {gathered}");
+            let voxel = f64::from(VOXEL) / pole.length();
+            let SunShares { diffuse, crowd, direct } = sun_shares(tau, own, clouds.xi.into(), voxel, clouds.transfer);
+            let got = f64::from(device_values[index].crowd);
+            assert!((got - crowd).abs() < 1e-3, "{elevation}°, particle {index}: {got}, expected {crowd}");
             for i in 0..3 {
                 // f32 positions relative to a particle are good to 4 mm of some 100 m; the direction to 1e-7 of up to
                 // 8e4 m.
@@ -123,7 +124,7 @@ fn long_thin_occluders_far_away_are_as_exact_as_near_ones() {
             .run(|rec| {
                 list.record(rec, [0.0; 3], &set)?;
                 tiling.record(rec, &params, &set)?;
-                lighting.record(rec, &tiling, &set, None, &clouds)
+                lighting.record(rec, &tiling, &set, None, &clouds, VOXEL)
             })
             .unwrap();
         let lights: Vec<ParticleLight> = read(&mut device, lighting.sun_light(), list.count());

@@ -13,6 +13,7 @@ use welkin::film::Film;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc};
 use welkin::grid::Counters;
+use welkin::lighting::volume::{LightVolume, VolumeDesign};
 use welkin::lut::{Detail, TableParams, Tables};
 use welkin::params::{Aim, Blend, Camera, Clouds, Lighting, Precision, Style};
 use welkin::reference::phase::PhaseFunction;
@@ -162,6 +163,7 @@ fn render(
     let counters = Buffer::array::<Counters>(&gpu, "counters", 1).unwrap();
     let pixels = (SIZE * SIZE) as usize;
     let bytes = Buffer::new(&gpu, "scene bytes", 16 * pixels as u64, BufferKind::Readback).unwrap();
+    let volume = LightVolume::new(&gpu, VolumeDesign::none(), 1).unwrap();
     let inputs = BlendInputs {
         frame: &frame,
         particles: &particles,
@@ -172,6 +174,8 @@ fn render(
         optical_depth_lut: tables.optical_depth.image(),
         scattering_lut: tables.scattering.image(),
         detail_tile: &detail.image,
+        volume: volume.params(0),
+        light_volume: volume.image(),
         opaque_distance: &depth,
         draw_args: &args,
         draw_args_offset: 0,

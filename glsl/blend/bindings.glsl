@@ -8,5 +8,7 @@ layout(binding = 6) uniform sampler3D scattering_lut;
 layout(binding = 7) uniform sampler3D detail_tile;
 layout(binding = 8) uniform sampler2D opaque_distance;
 
+layout(binding = 18, std430) restrict readonly buffer Volume { VolumeParams params; } volume;
+layout(binding = 19) uniform sampler3D light_volume;
 layout(binding = 12, std430) restrict readonly buffer Sky { SkyLight params; } sky_light;
 

@@ -1,4 +1,5 @@
 // The segment that a particle cuts out of the view ray of a pixel. Included after the bindings that it reads.
+#include "volume/lookup.glsl"
 layout(constant_id = 0) const uint LIGHTING = LIGHTING_TABLES;
 layout(constant_id = 1) const uint HOMOGENEOUS = 0;   // 1: density 1 everywhere inside, no table and no detail
 
@@ -63,8 +64,15 @@ Segment particle_segment(uint index, vec2 pixel) {
         }
         vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
         float tau_chord = sigma * (t_exit - t_enter);
-        s.colour = shade_tables(medium.params, sky_light.params, lights.elements[index], scattering_lut, f, p, ray, normal_us,
-                                dir, normal_ws, tau_chord, matter.y + depth);
+        // What others have scattered, as deep as the eye looks: there it is as bright as what comes out.
+        ParticleLight light = lights.elements[index];
+        float diffused = 0.0;
+        if (light.crowd > 0.0) {
+            float seen = s.t_enter + min(3.0 / sigma, 0.5 * length_inside);
+            diffused = light.crowd * volume_radiance(light_volume, f.camera + seen * dir);
+        }
+        s.colour = shade_tables(medium.params, sky_light.params, light, scattering_lut, f, p, ray, normal_us,
+                                dir, normal_ws, tau_chord, matter.y + depth, diffused);
     }
     return s;
 }

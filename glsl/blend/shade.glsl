@@ -9,6 +9,7 @@
 #include "lut/optical_depth_lookup.glsl"
 #include "lut/scattering_lookup.glsl"
 #include "medium/phase.glsl"
+#include "volume/params.glsl"
 
 // What the clouds are made of. Twin: src/blend/medium.rs.
 struct MediumParams {
@@ -18,7 +19,7 @@ struct MediumParams {
     float crease;           // strength of the crease term [1]
     float detail;           // strength of the detail noise [1]; 0 turns it off
     float relief;           // how much of the noise's slope turns the surface for lighting [1]
-    float lent;             // what absorption leaves of the light that particles lend each other [1]
+    float reserved_a;
     float reserved_b;
 };
 
@@ -33,7 +34,7 @@ const uint LIGHTING_FLAT = 1u;
 // Mean source function of sunlight and skylight along the ray: the colour C of the segment.
 // `entry_us` is where the lit surface lies and `mu` the cosine of incidence, after detail has moved both.
 vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sampler3D scattering, FrameParams frame, Particle p,
-                  BallRay ray, vec3 entry_us, vec3 dir, vec3 normal_ws, float tau_chord, float first_matter) {
+                  BallRay ray, vec3 entry_us, vec3 dir, vec3 normal_ws, float tau_chord, float first_matter, float diffused) {
     vec3 to_sun_us = normalize(to_unit_ball(p, vec4(frame.to_sun, 0.0)));
     float mu = max(-dot(entry_us, ray.dir_us), 1e-3);
     // Single scattering: of the homogeneous sphere in which this chord has this optical depth.
@@ -47,10 +48,9 @@ vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sample
     float along = dot(entry_us, to_sun_us);
     float towards = max(along, 0.0), away = max(-along, 0.0);
     vec3 share = vec3(towards, 1.0 - towards - away, away);
-    // What neighbours lend comes from where they are, more than from where the sun is (fitted like the rest of it).
     vec3 sunlight = sky.sun_irradiance_clouds * (medium.albedo * p_sun * single * dot(light.direct, share)
                                                  + multiple * dot(light.diffuse, share)
-                                                 + medium.lent * light.gathered * (1.0 - 0.5 * dot(normal_ws, frame.to_sun)));
+                                                 + diffused);
 
     // Sky and ground as two half-spheres of constant radiance E / π, seen by the surface; creases, which lie deep below the
     // ellipsoid, are brighter than edges (Yusov 4.4). Where neighbouring cloud stands before the sky, it shines instead

@@ -14,10 +14,10 @@ struct Particle {
 
 // Light that reaches a particle; shares of the sunlight at the pole facing the sun, the centre and the far pole.
 struct ParticleLight {
-    vec3  diffuse;    // of what the particle scatters many times, above 1 in the depth of a crowd
+    vec3  diffuse;    // of what the particle itself scatters many times [0, 1]
     float ambient;    // visibility of the sky [0, 1]
     vec3  direct;     // of what comes straight from the sun [0, 1]
-    float gathered;   // radiance that neighbours lend it, per irradiance of the sun [1/sr]
+    float crowd;      // how much it sees of what its neighbours scatter: 0 alone, 1 in the depth of a crowd
 };
 
 // Rotates v by the unit quaternion q.

@@ -15,9 +15,11 @@ layout(set = 0, binding = 2, std430) readonly restrict buffer TileHeads { uint h
 layout(set = 0, binding = 3, std430) readonly restrict buffer TileNodes { TileNode node[]; } tile_nodes;
 layout(set = 0, binding = 4, std430) restrict buffer CountersBuffer { Counters count; } counters;
 layout(set = 0, binding = 5, std430) writeonly restrict buffer SunLight { ParticleLight at[]; } sun;
+layout(set = 0, binding = 6, std430) writeonly restrict buffer SunDepths { vec4 at[]; } sun_depths;
 layout(push_constant) uniform SunPush {
     float xi;          // clouds.xi
     uint  transfer;    // TRANSFER_*
+    float voxel;       // edge of the finest voxels in which light diffuses [m]
 } push;
 #include "lighting/transfer.glsl"
 #include "lighting/sun_optical_depth.glsl"
@@ -32,6 +34,7 @@ void main() {
     atomicMax(counters.count.longest_walk, visited);
     if (visited > params.tiling.traversal_limit) atomicAdd(counters.count.truncated, 1u);
     float own = 2.0 * reach * params.tiling.extinction * particle.density;
-    SunShares shares = sun_shares(optical_depths, own, push.xi, push.transfer);
-    sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, shares.gathered);
+    SunShares shares = sun_shares(optical_depths, own, push.xi, push.voxel / reach, push.transfer);
+    sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, shares.crowd);
+    sun_depths.at[index] = vec4(optical_depths, own);
 }

@@ -20,20 +20,16 @@ pub struct MediumParams {
     pub detail: f32,
     /// How much the slope of the noise turns the surface that light meets.
     pub relief: f32,
-    /// What absorption leaves of the light that particles lend each other.
-    pub lent: f32,
+    /// Zero.
+    pub reserved_a: f32,
     /// Zero.
     pub reserved_b: f32,
 }
 assert_layout!(MediumParams, medium_params, {
     g_single: G_SINGLE, phase_function: PHASE_FUNCTION, albedo: ALBEDO, crease: CREASE,
     detail: DETAIL, relief: RELIEF,
-    lent: LENT, reserved_b: RESERVED_B,
+    reserved_a: RESERVED_A, reserved_b: RESERVED_B,
 });
-
-/// How often light that one particle of a crowd lends another has been scattered on its way, in round numbers: paths of
-/// the path-traced skies have some 30 events, those of a heap fewer. Not fitted: no truth here absorbs.
-const LENT_SCATTERINGS: i32 = 20;
 
 impl MediumParams {
     /// The medium of a scene.
@@ -46,7 +42,7 @@ impl MediumParams {
             crease: 0.5,
             detail: 1.0,
             relief: 0.7,
-            lent: clouds.albedo.powi(LENT_SCATTERINGS),
+            reserved_a: 0.0,
             reserved_b: 0.0,
         }
     }

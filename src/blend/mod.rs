@@ -25,6 +25,8 @@ macro_rules! scene_bindings {
             scattering_lut: $inputs.scattering_lut.sampled($crate::gpu::Sampler::LinearClamp),
             detail_tile: $inputs.detail_tile.sampled($crate::gpu::Sampler::LinearRepeat),
             opaque_distance: $inputs.opaque_distance.sampled($crate::gpu::Sampler::NearestClamp),
+            volume: $inputs.volume,
+            light_volume: $inputs.light_volume.sampled($crate::gpu::Sampler::LinearClamp),
             $($name: $resource,)*
         }
     };
@@ -96,6 +98,10 @@ pub struct BlendInputs<'a> {
     pub scattering_lut: &'a Image,
     /// Tile of billow noise.
     pub detail_tile: &'a Image,
+    /// [`VolumeParams`](crate::lighting::volume::VolumeParams).
+    pub volume: &'a Buffer,
+    /// What the clouds scatter ([`LightVolume::image`](crate::lighting::volume::LightVolume::image)).
+    pub light_volume: &'a Image,
     /// Distance to the opaque scene at the resolution of the targets [m].
     pub opaque_distance: &'a Image,
     /// `VkDrawIndirectCommand`: 4 vertices, one instance for each visible particle.

@@ -262,6 +262,8 @@ impl Tiled {
                     scattering_lut: inputs.scattering_lut.sampled(Sampler::LinearClamp),
                     detail_tile: inputs.detail_tile.sampled(Sampler::LinearRepeat),
                     opaque_distance: inputs.opaque_distance.sampled(Sampler::NearestClamp),
+                    volume: inputs.volume,
+                    light_volume: inputs.light_volume.sampled(Sampler::LinearClamp),
                     tile_ranges: &self.ranges,
                     pair_particles: &self.pairs.particles,
                     tile_particles: &self.particles.elements,

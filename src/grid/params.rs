@@ -166,6 +166,12 @@ impl GridDesign {
         Self { fixed, cell_edge }
     }
 
+    /// Edge of a cell of the innermost ring [m].
+    #[must_use]
+    pub fn cell_edge(&self) -> f64 {
+        self.cell_edge
+    }
+
     /// Cells of all rings.
     #[must_use]
     pub fn cell_count(&self) -> u32 {

@@ -7,6 +7,8 @@
 //!
 //! Other shaders get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
 
+pub mod volume;
+
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
@@ -19,15 +21,12 @@ use crate::shaders::{lighting_smooth_comp as smooth, lighting_sun_comp as sun};
 use crate::shared::ParticleLight;
 use crate::tiling::Tiling;
 
-/// Radiance that a particle deep in a crowd gets from its neighbours, per irradiance of the sun [1/sr]
-/// (`glsl/lighting/transfer.glsl`).
-pub const GATHERED: f32 = 0.13;
-
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct SunPush {
     xi: f32,
     transfer: u32,
+    voxel: f32,
 }
 
 #[repr(C)]
@@ -41,6 +40,7 @@ pub struct Lighting {
     sun: ComputePipeline,
     smooth: ComputePipeline,
     sun_light: Buffer,
+    sun_depths: Buffer,
     /// Stand-ins for the grid's lists when particles come from a list.
     no_grid: [Buffer; 3],
     capacity: u32,
@@ -59,6 +59,7 @@ impl Lighting {
             sun: ComputePipeline::new(gpu, &sun::PROGRAM, &[])?,
             smooth: ComputePipeline::new(gpu, &smooth::PROGRAM, &[])?,
             sun_light: Buffer::array::<ParticleLight>(gpu, "sun light", capacity as usize)?,
+            sun_depths: Buffer::array::<[f32; 4]>(gpu, "sun depths", capacity as usize)?,
             no_grid,
             capacity,
         })
@@ -68,6 +69,13 @@ impl Lighting {
     #[must_use]
     pub fn sun_light(&self) -> &Buffer {
         &self.sun_light
+    }
+
+    /// Of every particle the optical depths of others towards the sun at the pole that faces it, at its centre and at its far
+    /// pole, and its own diameter's.
+    #[must_use]
+    pub fn sun_depths(&self) -> &Buffer {
+        &self.sun_depths
     }
 
     /// Follows a [`ParticleSet`] that has grown; the device must be idle. True if it did.
@@ -80,7 +88,7 @@ impl Lighting {
     }
 
     /// Records occlusion and smoothing. `grid` is none for explicit particles, which are not smoothed and see the whole
-    /// sky.
+    /// sky. `voxel`: edge of the voxels in which light diffuses ([`volume::LightVolume::voxel_edge`]) [m].
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -88,6 +96,7 @@ impl Lighting {
         set: &ParticleSet,
         grid: Option<&Grid>,
         clouds: &Clouds,
+        voxel: f32,
     ) -> Result<()> {
         assert!(set.capacity() <= self.capacity, "the particle set has grown: call grow() too");
         let slot = rec.slot();
@@ -100,8 +109,9 @@ impl Lighting {
                 tile_nodes: tiling.nodes(),
                 counters: set.counters(),
                 sun: &self.sun_light,
+                sun_depths: &self.sun_depths,
             },
-            &SunPush { xi: clouds.xi, transfer: u32::from(clouds.transfer == Transfer::Exponential) },
+            &SunPush { xi: clouds.xi, transfer: u32::from(clouds.transfer == Transfer::Exponential), voxel },
             set.args(),
             ParticleSet::PARTICLE_ARGS,
         )?;

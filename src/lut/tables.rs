@@ -6,10 +6,9 @@ use super::optical_depth::style_index;
 use super::{LevelReport, OpticalDepthTable, ScatteringTable};
 use crate::Result;
 use crate::gpu::{Buffer, BufferKind, Frames, Image, Recorder};
-use crate::params::{Clouds, Phase, Style};
+use crate::params::{Clouds, Style};
 use crate::reference::monte_carlo::Medium;
 use crate::reference::optical_depth::mean_density;
-use crate::reference::phase::PhaseFunction;
 use crate::shaders;
 use glam::DVec3;
 use std::ops::ControlFlow;
@@ -47,12 +46,8 @@ pub struct TableParams {
 impl TableParams {
     /// What a scene's clouds need.
     pub fn new(clouds: &Clouds, detail: Detail) -> Self {
-        let phase = match clouds.phase {
-            Phase::CornetteShanks => PhaseFunction::CornetteShanks,
-            Phase::HenyeyGreenstein => PhaseFunction::HenyeyGreenstein,
-        };
         let medium = Medium {
-            phase,
+            phase: clouds.phase.into(),
             g_sun: f64::from(clouds.g_single),
             g: f64::from(clouds.g_multiple),
             albedo: f64::from(clouds.albedo),

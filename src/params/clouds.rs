@@ -109,8 +109,8 @@ pub enum Lighting {
 /// How the sunlight that reaches a particle depends on the optical depth τ of the particles in front of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
-    /// Light scattered many times fades as 1 / (1 + ξ τ), and particles of a crowd lend each other light
-    /// (`glsl/lighting/transfer.glsl`); what comes straight from the sun fades as exp(-τ).
+    /// What comes straight from the sun fades as exp(-τ), what feeds a particle's own multiple scattering as 1 / (1 + ξ τ),
+    /// and what all particles scatter diffuses through all of them (`docs/lighting.md`).
     Diffusion,
     /// All of it fades as exp(-ξ τ) (Yusov 5.3).
     Exponential,
@@ -121,7 +121,7 @@ impl Transfer {
     #[must_use]
     pub fn xi(self) -> f32 {
         match self {
-            Self::Diffusion => 0.1,
+            Self::Diffusion => 0.03,
             Self::Exponential => 0.05,
         }
     }

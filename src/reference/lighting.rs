@@ -3,7 +3,6 @@
 use glam::{DQuat, DVec3};
 
 use crate::grid::GridParams;
-use crate::lighting::GATHERED;
 use crate::params::Transfer;
 use crate::reference::grid::{Grid, puff_host};
 use crate::shared::Particle;
@@ -48,29 +47,28 @@ pub fn sun_optical_depth(
 pub struct SunShares {
     /// Share that feeds what the particle scatters many times, at the pole facing the sun, the centre, the far pole.
     pub diffuse: [f64; 3],
-    /// Radiance that its neighbours lend it, per irradiance of the sun [1/sr].
-    pub gathered: f64,
+    /// How much it sees of what its neighbours scatter.
+    pub crowd: f64,
     /// Share that comes straight from the sun, at the same points.
     pub direct: [f64; 3],
 }
 
 /// What of the sunlight reaches the points of a particle that have `tau` of others in front: the pole facing the sun, the
-/// centre, the far pole. `own`: the particle's own optical depth from pole to pole.
+/// centre, the far pole. `own`: the particle's own optical depth from pole to pole; `voxel`: edge
+/// of the voxels in which light diffuses, in half chords of the particle along the light.
 #[must_use]
-pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, transfer: Transfer) -> SunShares {
+pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, voxel: f64, transfer: Transfer) -> SunShares {
     match transfer {
         Transfer::Exponential => {
             let share = tau.map(|tau| (-xi * tau).exp());
-            SunShares { diffuse: share, gathered: 0.0, direct: share }
+            SunShares { diffuse: share, crowd: 0.0, direct: share }
         }
         Transfer::Diffusion => {
-            let crowd = 1.0 + (tau[2] - tau[0]).max(0.0) / own.max(1e-3);
-            let others = 1.0 - 1.0 / crowd;
-            let kept = 1.0 - 2.55 * others + 3.6 * others.powi(2);
-            let shared_by = [crowd.powf(1.5), crowd, crowd.sqrt()];
+            let alone = own / ((tau[2] - tau[0]).max(0.0) + own).max(1e-6);
+            let kept = voxel.min(1.0) + alone.powi(4) * (1.0 - voxel.min(1.0));
             SunShares {
-                diffuse: std::array::from_fn(|i| kept / (1.0 + xi * tau[i] / shared_by[i])),
-                gathered: f64::from(GATHERED) * others / (1.0 + 2.0 * xi * tau[1]),
+                diffuse: tau.map(|tau| kept / (1.0 + xi * tau)),
+                crowd: 1.0 - alone.powi(6),
                 direct: tau.map(|tau| (-tau).exp()),
             }
         }
@@ -144,32 +142,16 @@ mod tests {
     fn alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less() {
         for transfer in [Transfer::Diffusion, Transfer::Exponential] {
             let xi = f64::from(transfer.xi());
-            let alone = SunShares { diffuse: [1.0; 3], gathered: 0.0, direct: [1.0; 3] };
-            assert_eq!(sun_shares([0.0; 3], 5.0, xi, transfer), alone);
+            let alone = SunShares { diffuse: [1.0; 3], crowd: 0.0, direct: [1.0; 3] };
+            assert_eq!(sun_shares([0.0; 3], 5.0, xi, 0.2, transfer), alone);
             let mut before = f64::INFINITY;
             for tau in [0.1, 1.0, 10.0, 100.0] {
                 // The same in front of all three points: nobody overlaps.
-                let SunShares { diffuse, gathered, direct } = sun_shares([tau; 3], 5.0, xi, transfer);
-                assert!(diffuse[0] == diffuse[1] && diffuse[1] == diffuse[2] && gathered == 0.0);
+                let SunShares { diffuse, crowd, direct } = sun_shares([tau; 3], 5.0, xi, 0.2, transfer);
+                assert!(diffuse[0] == diffuse[1] && diffuse[1] == diffuse[2] && crowd == 0.0);
                 assert!(diffuse[0] < before && diffuse[0] >= direct[0] && direct[0] > 0.0, "{transfer:?} {tau}");
                 before = diffuse[0];
             }
-        }
-    }
-
-    #[test]
-    fn a_crowd_lends_light_and_is_brightest_where_it_is_deep() {
-        let xi = f64::from(Transfer::Diffusion.xi());
-        let shares = |crowd: f64| sun_shares([0.0, 4.0 * crowd, 8.0 * crowd], 4.0, xi, Transfer::Diffusion);
-        let (few, many) = (shares(0.5), shares(4.0));
-        assert!(few.diffuse[0] < 1.0 && many.diffuse[0] > 1.0, "{few:?} {many:?}");
-        for light in [few, many] {
-            assert!(light.gathered > 0.0 && light.gathered < f64::from(GATHERED), "{light:?}");
-            assert!(light.diffuse[0] > light.diffuse[1] && light.diffuse[1] > light.diffuse[2], "{light:?}");
-        }
-        // However many there are, no share is below nothing.
-        for crowd in 0..100 {
-            assert!(shares(0.1 * f64::from(crowd)).diffuse[2] > 0.0, "{crowd}");
         }
     }
 }

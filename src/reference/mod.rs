@@ -20,3 +20,4 @@ pub mod segments;
 pub mod sphere;
 pub mod tiling;
 pub mod transport;
+pub mod volume;

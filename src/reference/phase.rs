@@ -4,6 +4,8 @@
 
 use std::f64::consts::PI;
 
+use crate::params::Phase;
+
 /// The shape of the phase function; the asymmetry `g` goes with each use, since a medium may use two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum PhaseFunction {
@@ -12,6 +14,15 @@ pub enum PhaseFunction {
     CornetteShanks,
     /// Henyey–Greenstein.
     HenyeyGreenstein,
+}
+
+impl From<Phase> for PhaseFunction {
+    fn from(phase: Phase) -> Self {
+        match phase {
+            Phase::CornetteShanks => Self::CornetteShanks,
+            Phase::HenyeyGreenstein => Self::HenyeyGreenstein,
+        }
+    }
 }
 
 impl PhaseFunction {

@@ -11,6 +11,7 @@ use welkin::detail::DetailTile;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc};
 use welkin::grid::Counters;
+use welkin::lighting::volume::{LightVolume, VolumeDesign};
 use welkin::params::{Aim, Blend, Camera, Clouds, Lighting, Precision};
 use welkin::reference::scene;
 use welkin::reference::segments::{Composite, Segment};
@@ -142,6 +143,7 @@ pub fn draw_with_budget(
     let nearest_bytes = Buffer::new(&gpu, "nearest bytes", 4 * pixels as u64, BufferKind::Readback).unwrap();
     let counters = Buffer::array::<Counters>(&gpu, "counters", 1).unwrap();
     let counts = Buffer::new(&gpu, "counts", counters.size(), BufferKind::Readback).unwrap();
+    let volume = LightVolume::new(&gpu, VolumeDesign::none(), 1).unwrap();
     let inputs = BlendInputs {
         frame: &frame,
         particles: &particle_buffer,
@@ -152,6 +154,8 @@ pub fn draw_with_budget(
         optical_depth_lut: &unused,
         scattering_lut: &unused,
         detail_tile: &detail.image,
+        volume: volume.params(0),
+        light_volume: volume.image(),
         opaque_distance: &depth,
         draw_args: &args,
         draw_args_offset: 0,

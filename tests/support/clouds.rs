@@ -23,6 +23,9 @@ pub fn silent(device: &Standalone) {
     assert_eq!(device.messages().expect("opened with validation").all(), Vec::<String>::new());
 }
 
+/// Edge of the voxels in which light diffuses [m]: smaller than particles, so that it counts.
+pub const VOXEL: f32 = 50.0;
+
 /// Scene and sizes of a test: small rings, everything else as by default.
 pub struct Setup {
     pub clouds: Clouds,
@@ -118,7 +121,7 @@ impl Stages {
                 rec.pass("compact", |rec| self.compact.record(rec, &self.set, &planes, frame.camera))?;
                 rec.pass("tiling", |rec| self.tiling.record(rec, &setup.tiling_params(), &self.set))?;
                 rec.pass("lighting", |rec| {
-                    self.lighting.record(rec, &self.tiling, &self.set, Some(&self.grid), &setup.clouds)
+                    self.lighting.record(rec, &self.tiling, &self.set, Some(&self.grid), &setup.clouds, VOXEL)
                 })?;
                 self.counters.record(rec, &self.set);
                 Ok(rec.slot())

@@ -1,0 +1,87 @@
+// Every particle adds its matter, and how much of it the sun reaches, to the voxels that it covers: of the finest level
+// that holds all of it, or of the coarsest. One thread a particle.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "compact/index.glsl"
+#include "compact/view.glsl"
+#include "grid/counters.glsl"
+#include "volume/params.glsl"
+layout(local_size_x = 64) in;
+
+layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;
+layout(set = 0, binding = 1, std430) readonly restrict buffer CountersBuffer { Counters count; } counters;
+layout(set = 0, binding = 2, std430) readonly restrict buffer Particles { Particle particle[]; } particles;
+layout(set = 0, binding = 3, std430) readonly restrict buffer SunDepths { vec4 at[]; } sun_depths;
+layout(set = 0, binding = 4, std430) restrict buffer Matter { uvec2 voxel[]; } matter;   // extinction; the same × sunlight
+
+#include "volume/place.glsl"
+
+// Share of a ball's matter, projected on an axis, that lies below `u` radii from its centre.
+float below(float u) {
+    u = clamp(u, -1.0, 1.0);
+    return 0.5 + u * (0.75 - 0.25 * u * u);
+}
+
+void main() {
+    uint index = linear_index();
+    if (index >= counters.count.stored) return;
+    Particle p = particles.particle[index];
+    float sigma = volume.params.extinction * p.density * p.fade;
+    if (sigma <= 0.0) return;
+
+    vec3 extent = volume.params.body * vec3(ellipsoid_extent(p, vec3(1, 0, 0)), ellipsoid_extent(p, vec3(0, 1, 0)), ellipsoid_extent(p, vec3(0, 0, 1)));
+    uint level = 0u;
+    vec3 at, reach;
+    for (;; ++level) {
+        vec2 place = volume_place(p.centre, level);
+        float height = volume_voxel_height(level);
+        at = vec3(place.x, volume_height(p.centre) * (volume.params.height / height), place.y);
+        reach = extent * vec3(volume.params.corner[level].w, 1.0 / height, volume.params.corner[level].w);
+        if (all(greaterThanEqual(at.xz, reach.xz)) && all(lessThanEqual(at.xz + reach.xz, vec2(volume.params.dim)))) break;
+        if (level + 1u == volume.params.levels) break;   // what stands out of it is left out
+    }
+    if (any(lessThanEqual(at.xz + reach.xz, vec2(0.0))) || any(greaterThanEqual(at.xz - reach.xz, vec2(volume.params.dim)))) return;
+
+    float voxel = volume.params.corner[level].z * volume.params.corner[level].z * volume_voxel_height(level);
+    float mass = sigma * 4.18879020 * p.semi_axes.x * p.semi_axes.y * p.semi_axes.z / voxel * VOLUME_UNITS;
+    // Optical depths count as those of isotropic scattering (similarity): what goes on forward has not been scattered.
+    vec4 depth = (1.0 - volume.params.albedo * volume.params.asymmetry) * volume.params.shade * sun_depths.at[index];   // near pole, centre, far pole; own
+    vec3 sun_us = to_unit_ball(p, vec4(volume.params.to_sun, 0.0));
+    float per_metre = length(sun_us);
+    // Along the light, in units of the way from the centre to a pole: 1 at the pole that faces it.
+    vec3 along_sun = rotate(p.rotation, sun_us / (per_metre * p.semi_axes)) / volume.params.body * extent;
+    // Half the optical depth of light's way through a box, by the lengths of its edges: the shortest of three ways.
+    vec3 way_sun = 0.25 * (max(depth.z - depth.x, 0.0) + depth.w) * per_metre / volume.params.body * extent
+                 / max(abs(volume.params.to_sun), 1e-4);
+
+    // Matter above and below the box goes into its faces.
+    ivec3 most = ivec3(volume.params.dim, volume.params.stack[level].w, volume.params.dim) - 1;
+    ivec3 first = clamp(ivec3(floor(at - reach)), ivec3(0), most), last = clamp(ivec3(floor(at + reach)), ivec3(0), most);
+    for (int y = first.y; y <= last.y; ++y) {
+        vec3 from, to;
+        from.y = y == first.y ? -1.0 : (float(y) - at.y) / reach.y;
+        to.y = y == last.y ? 1.0 : (float(y + 1) - at.y) / reach.y;
+        float share_y = mass * (below(to.y) - below(from.y));
+        for (int z = first.z; z <= last.z; ++z) {
+            from.z = max((float(z) - at.z) / reach.z, -1.0);
+            to.z = min((float(z + 1) - at.z) / reach.z, 1.0);
+            float share_z = share_y * (below(to.z) - below(from.z));
+            for (int x = first.x; x <= last.x; ++x) {
+                from.x = max((float(x) - at.x) / reach.x, -1.0);
+                to.x = min((float(x + 1) - at.x) / reach.x, 1.0);
+                float extinction = share_z * (below(to.x) - below(from.x));
+                // Sunlight at the middle of what the voxel has of the particle, averaged over the light's way through it.
+                vec3 middle = 0.5 * (from + to);
+                float along = clamp(dot(along_sun, middle), -1.0, 1.0), rest = max(1.0 - dot(middle, middle), 0.0);
+                float tau = mix(depth.y, along > 0.0 ? depth.x : depth.z, abs(along))
+                          + 0.5 * depth.w * max(sqrt(rest + along * along) - along, 0.0);
+                vec3 ways = way_sun * (to - from);
+                float way = max(min(ways.x, min(ways.y, ways.z)), 1e-3);
+                float sunlight = exp(-max(tau - way, 0.0)) * (1.0 - exp(-2.0 * way)) / (2.0 * way);
+                uint index = voxel_index(level, ivec3(x, y, z));
+                atomicAdd(matter.voxel[index].x, uint(extinction + 0.5));
+                atomicAdd(matter.voxel[index].y, uint(extinction * sunlight + 0.5));
+            }
+        }
+    }
+}
