@@ -64,11 +64,12 @@ Segment particle_segment(uint index, vec2 pixel) {
         }
         vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
         float tau_chord = sigma * (t_exit - t_enter);
-        // What others have scattered, as deep as the eye looks: there it is as bright as what comes out.
+        // What others have scattered, as deep as the eye looks: most of a transport mean free path behind the surface. That may
+        // be beyond the particle, for light of what stands behind goes through it nearly forward.
         ParticleLight light = lights.elements[index];
         float diffused = 0.0;
         if (light.crowd > 0.0) {
-            float seen = s.t_enter + min(3.0 / sigma, 0.5 * length_inside);
+            float seen = s.t_enter + min(3.0 / sigma, 1.0 / volume.params.vacuum);
             diffused = light.crowd * volume_radiance(light_volume, f.camera + seen * dir);
         }
         s.colour = shade_tables(medium.params, sky_light.params, light, scattering_lut, f, p, ray, normal_us,

@@ -65,10 +65,11 @@ pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, voxel: f64, transfer: Transf
         }
         Transfer::Diffusion => {
             let alone = own / ((tau[2] - tau[0]).max(0.0) + own).max(1e-6);
+            let large = (1.0 / (voxel * voxel)).min(1.0);
             let kept = voxel.min(1.0) + alone.powi(4) * (1.0 - voxel.min(1.0));
             SunShares {
                 diffuse: tau.map(|tau| kept / (1.0 + xi * tau)),
-                crowd: 1.0 - alone.powi(6),
+                crowd: 1.0 - large * alone.powi(6),
                 direct: tau.map(|tau| (-tau).exp()),
             }
         }
