@@ -111,6 +111,48 @@ fn a_sky_has_the_light_of_the_converged_solution_and_all_of_its_matter() {
     }
 }
 
+/// Boxes follow the camera by two voxels at a time: what is looked at in them must not show it.
+#[test]
+fn light_does_not_jump_when_the_boxes_move() {
+    let setup = Setup::default();
+    let mut device = open();
+    let stages = Stages::new(&device, &setup);
+    stages.run(&mut device, &setup);
+    let (clouds, edge) = (&setup.clouds, setup.design().cell_edge());
+    let (cutoff, thickness) = (f64::from(clouds.particle_cutoff), f64::from(clouds.thickness));
+    let design = VolumeDesign::of_layer(edge, setup.quality.cells, cutoff, thickness);
+    let medium = VolumeMedium::new(clouds, 0.8);
+    let mut at = |x: f64| {
+        let place = Place {
+            centre: [x - setup.origin[0], setup.camera[1] - setup.origin[1], setup.camera[2] - setup.origin[2]],
+            origin: setup.origin,
+            base: clouds.altitude.into(),
+            planet_radius: 6.371e6,
+            to_sun: setup.to_sun,
+        };
+        light(&mut device, design, &place, &medium, &stages.set, stages.lighting.sun_depths())
+    };
+    // They move where the camera is half way between two even voxels.
+    let even = 2.0 * design.edge * (setup.camera[0] / (2.0 * design.edge)).round();
+    let (before, after) = (at(even + 0.99 * design.edge), at(even + 1.01 * design.edge));
+    let (old, new) = (Volume(&before.params), Volume(&after.params));
+    assert_eq!(new.size(0), old.size(0));
+    let moved = ((after.params.corner[0][0] - before.params.corner[0][0]) / after.params.corner[0][2]).round() as i32;
+    assert_eq!(moved, 2, "the test wants boxes that move");
+    let (dim, rim) = (before.params.dim as i32, 2);
+    let (mut error, mut total) = (0.0, 0.0);
+    for [x, y, z] in old.voxels(0).filter(|[x, _, z]| [x, z].iter().all(|&&i| (rim + 2..dim - rim - 2).contains(&i))) {
+        let (a, b) = (old.index(0, [x, y, z]), new.index(0, [x - moved, y, z]));
+        let weight = extinction(before.matter[a])[0];
+        error += weight * f64::from(before.light[a][1] - after.light[b][1]).powi(2);
+        total += weight * f64::from(before.light[a][1]).powi(2);
+    }
+    let relative = (error / total).sqrt();
+    println!("light moves by {relative:.5}");
+    assert!(relative < 0.02, "{relative}");
+    silent(&device);
+}
+
 /// A deck of grey ellipsoids so flat and wide that it is a slab, lit from above: what leaves it below, over what leaves it at
 /// both sides, is that of P1 for a slab with Marshak's conditions.
 #[test]
