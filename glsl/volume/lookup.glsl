@@ -13,17 +13,18 @@ float volume_level_radiance(sampler3D light_volume, vec2 place, float height, ui
     return textureLod(light_volume, vec3(place / float(volume.params.dim), up / float(volume.params.layers)), 0.0).x;
 }
 
+// How far a position in a level lies from what is not looked at [voxels].
+float volume_inside(vec2 place) {
+    return min(min(place.x, place.y), float(volume.params.dim) - max(place.x, place.y)) - VOLUME_RIM;
+}
+
 float volume_radiance(sampler3D light_volume, vec3 p_ws) {
     if (volume.params.levels == 0u) return 0.0;
-    float height = volume_height(p_ws), dim = float(volume.params.dim);
+    float height = volume_height(p_ws);
     uint level = 0u;
-    vec2 place;
-    float inside;
-    for (;; ++level) {
-        place = volume_place(p_ws, level);
-        inside = min(min(place.x, place.y), dim - max(place.x, place.y)) - VOLUME_RIM;
-        if (inside > 0.0 || level + 1u == volume.params.levels) break;
-    }
+    vec2 place = volume_place(p_ws, level);
+    while (volume_inside(place) <= 0.0 && level + 1u < volume.params.levels) place = volume_place(p_ws, ++level);
+    float inside = volume_inside(place);
     float radiance = volume_level_radiance(light_volume, place, height, level);
     if (inside < VOLUME_BLEND && level + 1u < volume.params.levels) {
         float coarser = volume_level_radiance(light_volume, volume_place(p_ws, level + 1u), height, level + 1u);

@@ -22,6 +22,12 @@ float below(float u) {
     return 0.5 + u * (0.75 - 0.25 * u * u);
 }
 
+// Whether a level holds all of an ellipsoid that reaches so far from its centre.
+bool fits(vec3 centre, vec3 extent, uint level) {
+    vec2 place = volume_place(centre, level), reach = extent.xz * volume.params.corner[level].w;
+    return all(greaterThanEqual(place, reach)) && all(lessThanEqual(place + reach, vec2(volume.params.dim)));
+}
+
 void main() {
     uint index = linear_index();
     if (index >= counters.count.stored) return;
@@ -31,18 +37,14 @@ void main() {
 
     vec3 extent = volume.params.body * vec3(ellipsoid_extent(p, vec3(1, 0, 0)), ellipsoid_extent(p, vec3(0, 1, 0)), ellipsoid_extent(p, vec3(0, 0, 1)));
     uint level = 0u;
-    vec3 at, reach;
-    for (;; ++level) {
-        vec2 place = volume_place(p.centre, level);
-        float height = volume_voxel_height(level);
-        at = vec3(place.x, volume_height(p.centre) * (volume.params.height / height), place.y);
-        reach = extent * vec3(volume.params.corner[level].w, 1.0 / height, volume.params.corner[level].w);
-        if (all(greaterThanEqual(at.xz, reach.xz)) && all(lessThanEqual(at.xz + reach.xz, vec2(volume.params.dim)))) break;
-        if (level + 1u == volume.params.levels) break;   // what stands out of it is left out
-    }
+    while (level + 1u < volume.params.levels && !fits(p.centre, extent, level)) ++level;
+    float height = volume_voxel_height(level);
+    vec2 place = volume_place(p.centre, level);
+    vec3 at = vec3(place.x, volume_height(p.centre) * (volume.params.height / height), place.y);
+    vec3 reach = extent * vec3(volume.params.corner[level].w, 1.0 / height, volume.params.corner[level].w);
     if (any(lessThanEqual(at.xz + reach.xz, vec2(0.0))) || any(greaterThanEqual(at.xz - reach.xz, vec2(volume.params.dim)))) return;
 
-    float voxel = volume.params.corner[level].z * volume.params.corner[level].z * volume_voxel_height(level);
+    float voxel = volume.params.corner[level].z * volume.params.corner[level].z * height;
     float mass = sigma * 4.18879020 * p.semi_axes.x * p.semi_axes.y * p.semi_axes.z / voxel * VOLUME_UNITS;
     // Optical depths count as those of isotropic scattering (similarity): what goes on forward has not been scattered.
     vec4 depth = (1.0 - volume.params.albedo * volume.params.asymmetry) * volume.params.shade * sun_depths.at[index];   // near pole, centre, far pole; own
