@@ -15,7 +15,7 @@ use crate::frame::{FrameInputs, FrameOutput, assert_size};
 use crate::gpu::{Buffer, BufferKind, Gpu, Image, ImageDesc, Recorder};
 use crate::grid::{CounterReadback, Counters, Grid, GridDesign, ParticleList, ParticleSet};
 use crate::lighting::Lighting;
-use crate::lighting::volume::{LightVolume, Place, VolumeDesign, VolumeMedium};
+use crate::lighting::volume::{LightVolume, Place, VolumeDesign, VolumeMedium, mean_profile};
 use crate::params::{
     Camera, Clouds, Lighting as LightingKind, Params, Quality, SkyModel, Source, Style, Sun, SunPosition, Transfer,
 };
@@ -50,6 +50,8 @@ pub struct Renderer {
     tiling: Tiling,
     lighting: Lighting,
     volume: LightVolume,
+    /// Mean density of a particle over its ball.
+    mean_profile: f32,
     detail: DetailTile,
     detail_filled: bool,
     blender: Blender,
@@ -125,6 +127,7 @@ impl Renderer {
             compact: Compact::new(gpu, set.capacity())?,
             tiling: Tiling::new(gpu, levels, set.capacity(), set.capacity().saturating_mul(NODES_PER_PARTICLE), slots)?,
             lighting: Lighting::new(gpu, set.capacity())?,
+            mean_profile: mean_profile(params.clouds.style, params.clouds.seed),
             volume: LightVolume::new(gpu, volume_design(&particles, &params.clouds, quality), slots)?,
             detail: DetailTile::new(gpu)?,
             detail_filled: false,
@@ -328,7 +331,7 @@ impl Renderer {
                 planet_radius: 0.5 / f64::from(slab.inverse_diameter),
                 to_sun,
             };
-            let medium = VolumeMedium::new(clouds, fill);
+            let medium = VolumeMedium::with_mean(clouds, fill, self.mean_profile);
             rec.pass("light volume", |rec| self.volume.record(rec, &place, &medium, set, self.lighting.sun_depths()))?;
         } else {
             self.volume.record_none(rec);

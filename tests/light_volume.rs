@@ -7,7 +7,7 @@ use clouds::{Setup, Stages, open, read, silent};
 use welkin::gpu::Buffer;
 use welkin::gpu::standalone::Standalone;
 use welkin::grid::{ParticleList, ParticleSet};
-use welkin::lighting::volume::{LightVolume, Place, VACUUM, VolumeDesign, VolumeMedium, VolumeParams};
+use welkin::lighting::volume::{LightVolume, Place, VolumeDesign, VolumeMedium, VolumeParams};
 use welkin::params::{Clouds, ParticleDesc, Style};
 use welkin::reference::volume::{Volume, extinction};
 use welkin::shared::Particle;
@@ -226,10 +226,12 @@ fn a_ball_is_splat_whole_and_lit_through() {
         let mass = 4.0 / 3.0 * std::f64::consts::PI * 300.0f64.powi(3) * sigma;
         let got = sum.map(|s| s * width * width * height);
         assert!((got[0] / mass - 1.0).abs() < 2e-3, "{} of {mass}", got[0]);
-        // What a ball takes out of a beam: π r² (1 - 2 (1 - (1 + τ) e^(-τ)) / τ²), τ its diameter.
+        // What a ball takes out of a beam: π r² (1 - 2 (1 - (1 + τ) e^(-τ)) / τ²), τ its diameter. A voxel takes the light at the
+        // middle of its part, averaged along the light alone; across it the mean of exp(-τ) is greater: 9 % are missing.
         let tau = 2.0 * sigma * 300.0;
         let taken =
             std::f64::consts::PI * 300.0f64.powi(2) * (1.0 - 2.0 * (1.0 - (1.0 + tau) * (-tau).exp()) / (tau * tau));
+        println!("at {x}, {y}: {:.4} of its matter, {:.4} of what it takes out", got[0] / mass, got[1] / taken);
         assert!((got[1] / taken - 1.0).abs() < 0.1, "{} of {taken}", got[1]);
     }
     silent(&device);
@@ -263,5 +265,4 @@ fn voxels_stay_where_they_are_while_the_camera_moves() {
             }
         }
     }
-    assert!((VACUUM - at(0.0, 0.0).vacuum).abs() < f32::EPSILON);
 }
