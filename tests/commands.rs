@@ -2,7 +2,7 @@
 mod support;
 
 use std::process::Output;
-use support::folder::{command, directory, files, json, npy, run};
+use support::folder::{command, directory, files, json, npy, refused, run};
 use support::{stderr, stdout};
 
 /// A scene that needs no tables: one ellipsoid of its own colour before black.
@@ -141,6 +141,22 @@ fn bench_compares_two_modes_in_one_run() {
     assert!(report["ratio"]["frame"].as_f64().unwrap() > 0.0);
     let passes = report["a"]["passes"].as_array().unwrap();
     assert!(passes.iter().any(|pass| pass["name"] == "blend" && pass["p95_ms"].as_f64() >= pass["median_ms"].as_f64()));
+}
+
+#[test]
+fn bench_compares_values_of_the_scene_in_one_run() {
+    let directory = directory(FLAT);
+    let line = "bench sky.toml --size 32x16 --vs alpha --vs-set clouds.coverage=0 --vs-set film.exposure_ev=1 --measure 2 --warmup 0 --json";
+    let report: serde_json::Value = serde_json::from_str(&stdout(&run(directory.path(), line))).unwrap();
+    let opponents = report["vs"].as_array().unwrap();
+    let sets: Vec<_> = opponents.iter().map(|opponent| opponent["set"].clone()).collect();
+    assert_eq!(sets, [serde_json::json!([]), serde_json::json!(["clouds.coverage=0", "film.exposure_ev=1"])]);
+    let turns = &opponents[1]["ratio"]["frame_in_turns"];
+    let [low, median, high] = ["low", "median", "high"].map(|key| turns[key].as_f64().unwrap());
+    assert!(0.0 < low && low <= median && median <= high, "{turns}");
+
+    let line = "bench sky.toml --size 32x16 --vs-set clouds.covrage=0";
+    refused(directory.path(), line, &["--vs-set", "clouds.covrage", "known key"]);
 }
 
 #[test]

@@ -243,6 +243,9 @@ pub struct BenchArgs {
     /// Compare with these modes in the same run, frame by frame in turns; all: with every mode that the device has
     #[arg(long, value_name = "MODE[:K],...|all", value_delimiter = ',', value_parser = parse_versus)]
     pub vs: Vec<Versus>,
+    /// Compare with the same scene after replacing this value, in the same way; given again, all of them together
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub vs_set: Vec<String>,
     /// Frames measured per mode
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub measure: u32,

@@ -1,4 +1,5 @@
-//! `welkin bench`: GPU time per pass, and other modes measured in turns with the first so that all see the same machine.
+//! `welkin bench`: GPU time per pass, and other modes and settings measured in turns with the first so that all see the same
+//! machine.
 
 use std::fmt::Write;
 
@@ -11,7 +12,7 @@ use super::args::{BenchArgs, Versus};
 use super::progress::{Progress, note};
 use super::scenes;
 use super::session::{Device, Session};
-use super::summary::{PassTimes, median, p95};
+use super::summary::{PassTimes, median, median_bounds, p95};
 
 #[derive(Serialize)]
 struct Report {
@@ -22,10 +23,10 @@ struct Report {
     warmup_frames: u32,
     measured_frames: u32,
     a: Side,
-    /// The first mode of `--vs`.
+    /// The first opponent.
     b: Option<Side>,
     ratio: Option<Ratio>,
-    /// All modes of `--vs`.
+    /// The modes of `--vs`, and the scene under `--vs-set`.
     vs: Vec<Opponent>,
 }
 
@@ -39,6 +40,8 @@ struct Opponent {
 #[derive(Serialize, Clone)]
 struct Side {
     blend: BlendStats,
+    /// What `--vs-set` replaced.
+    set: Vec<String>,
     /// Size of the tables that lit the last frame.
     tables: Option<String>,
     frame: Times,
@@ -64,9 +67,19 @@ struct Times {
 #[derive(Serialize, Clone)]
 struct Ratio {
     frame: f64,
+    frame_in_turns: Option<InTurns>,
     compositing: f64,
     /// Passes that both have.
     passes: Vec<PassRatio>,
+}
+
+/// Ratios of frames that were rendered one after the other, which drifts of the machine's speed leave alone.
+#[derive(Serialize, Clone, Copy)]
+struct InTurns {
+    median: f64,
+    /// The median of endlessly many lies between these with 95 %.
+    low: f64,
+    high: f64,
 }
 
 #[derive(Serialize, Clone)]
@@ -82,6 +95,7 @@ const COMPOSITING: &[&str] = &["bin", "blend", "resolve"];
 struct Contender {
     session: Session,
     params: Params,
+    set: Vec<String>,
     totals: Vec<f64>,
     compositing: Vec<f64>,
     passes: PassTimes,
@@ -90,7 +104,8 @@ struct Contender {
 impl Contender {
     fn open(device: &mut Device, params: Params, args: &BenchArgs) -> Result<Self> {
         let session = Session::open(device, &params, &args.picture)?;
-        Ok(Self { session, params, totals: Vec::new(), compositing: Vec::new(), passes: PassTimes::default() })
+        let (totals, compositing, passes) = (Vec::new(), Vec::new(), PassTimes::default());
+        Ok(Self { session, params, set: Vec::new(), totals, compositing, passes })
     }
 
     fn measure(&mut self, device: &mut Device, frame: u32, counts: bool) -> Result<()> {
@@ -112,6 +127,7 @@ impl Contender {
         let passes = self.passes.iter().map(|(name, values)| Pass { name: name.into(), times: times(values) });
         Side {
             blend: self.session.blend(),
+            set: self.set.clone(),
             tables: self.session.tables().map(|tables| tables.size),
             frame: times(&self.totals),
             compositing: times(&self.compositing),
@@ -128,6 +144,13 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         Versus::All => None,
     });
     let mut others = named.collect::<Result<Vec<_>>>()?;
+    let replaced = match args.vs_set.as_slice() {
+        [] => None,
+        values => {
+            let params = scenes::load_replaced(&args.scene, &args.picture, "--vs-set", values)?;
+            Some(scenes::blended(params, args.blend, "--blend")?)
+        }
+    };
     let mut device = Device::open(&args.picture.scene, false)?;
     let mut contenders = vec![Contender::open(&mut device, first, args)?];
     if args.vs.contains(&Versus::All) {
@@ -139,6 +162,10 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     for params in others {
         contenders.push(Contender::open(&mut device, params, args)?);
     }
+    if let Some(params) = replaced {
+        let contender = Contender::open(&mut device, params, args)?;
+        contenders.push(Contender { set: args.vs_set.clone(), ..contender });
+    }
 
     let mut progress = Progress::start("bench", u64::from(args.warmup) + u64::from(args.measure));
     for frame in 0..args.warmup + args.measure {
@@ -149,9 +176,18 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     }
     drop(progress);
 
-    let mut sides = contenders.iter().map(Contender::side);
-    let Some(a) = sides.next() else { return Ok(()) };
-    let vs: Vec<_> = sides.map(|side| Opponent { ratio: ratio(&a, &side), side }).collect();
+    let Some((first, others)) = contenders.split_first() else { return Ok(()) };
+    let a = first.side();
+    let vs: Vec<_> = others
+        .iter()
+        .map(|other| {
+            let side = other.side();
+            Opponent {
+                ratio: Ratio { frame_in_turns: in_turns(&first.totals, &other.totals), ..ratio(&a, &side) },
+                side,
+            }
+        })
+        .collect();
     let report = Report {
         scene: args.scene.display().to_string(),
         width: args.picture.size.width,
@@ -193,6 +229,12 @@ fn times(values: &[f64]) -> Times {
     Times { median_ms: median(values).unwrap_or(0.0), p95_ms: p95(values).unwrap_or(0.0) }
 }
 
+fn in_turns(a: &[f64], b: &[f64]) -> Option<InTurns> {
+    let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| a / b).filter(|ratio| ratio.is_finite()).collect();
+    let [low, high] = median_bounds(&ratios)?;
+    Some(InTurns { median: median(&ratios)?, low, high })
+}
+
 fn ratio(a: &Side, b: &Side) -> Ratio {
     let passes = a.passes.iter().filter_map(|pass| {
         let other = b.passes.iter().find(|other| other.name == pass.name)?;
@@ -201,6 +243,7 @@ fn ratio(a: &Side, b: &Side) -> Ratio {
     });
     Ratio {
         frame: a.frame.median_ms / b.frame.median_ms,
+        frame_in_turns: None,
         compositing: a.compositing.median_ms / b.compositing.median_ms,
         passes: passes.collect(),
     }
@@ -225,7 +268,8 @@ fn text(report: &Report) -> String {
         text.push('\n');
     };
     let ms = |value: f64| format!("{value:.3}");
-    row("median [ms]", sides.iter().map(|side| side.blend.used.clone()).collect());
+    let title = |side: &Side| if side.set.is_empty() { side.blend.used.clone() } else { "--vs-set".into() };
+    row("median [ms]", sides.iter().map(|side| title(side)).collect());
     for name in names {
         let cell =
             |side: &&Side| side.passes.iter().find(|pass| pass.name == name).map(|pass| ms(pass.times.median_ms));
@@ -242,12 +286,21 @@ fn text(report: &Report) -> String {
         row(
             &format!("{} over", report.a.blend.used),
             sides.iter().skip(1).fold(vec![String::new()], |mut cells, side| {
-                cells.push(side.blend.used.clone());
+                cells.push(title(side));
                 cells
             }),
         );
         row("  compositing", ratios(|ratio| ratio.compositing));
         row("  frame", ratios(|ratio| ratio.frame));
+        let in_turns = |of: fn(InTurns) -> f64| {
+            let cell = |opponent: &Opponent| {
+                opponent.ratio.frame_in_turns.map_or_else(|| "-".into(), |turns| format!("{:.3}", of(turns)))
+            };
+            std::iter::once(String::new()).chain(report.vs.iter().map(cell)).collect()
+        };
+        row("  in turns", in_turns(|turns| turns.median));
+        row("    95 % from", in_turns(|turns| turns.low));
+        row("    95 % to", in_turns(|turns| turns.high));
     }
     text
 }
@@ -264,6 +317,7 @@ mod tests {
         let passes = [("grid", 1.0), ("blend", blend_ms)];
         Side {
             blend: BlendStats { requested: used.into(), used: used.into(), reason: "asked for".into() },
+            set: Vec::new(),
             tables: None,
             frame: times(1.0 + blend_ms),
             compositing: times(blend_ms),
@@ -277,5 +331,15 @@ mod tests {
         assert_eq!((ratio.frame, ratio.compositing), (2.0, 2.5));
         let passes: Vec<_> = ratio.passes.iter().map(|pass| (pass.name.as_str(), pass.ratio)).collect();
         assert_eq!(passes, [("grid", 1.0), ("blend", 2.5)]);
+    }
+
+    #[test]
+    fn frames_in_turns_see_the_same_machine() {
+        // A machine that becomes three times slower half way: the ratio of medians would be anything from 0.5 to 2.
+        let b: Vec<f64> = (0..20).map(|i| if i < 10 { 1.0 } else { 3.0 }).collect();
+        let a: Vec<f64> = b.iter().map(|b| 1.25 * b).collect();
+        let turns = in_turns(&a, &b).unwrap();
+        assert_eq!((turns.median, turns.low, turns.high), (1.25, 1.25, 1.25));
+        assert!(in_turns(&[], &[]).is_none());
     }
 }

@@ -13,23 +13,32 @@ pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
     load_with_quality(path, args.quality, &args.scene)
 }
 
+/// The same with more values replaced, which `flag` gave.
+pub fn load_replaced(path: &Path, args: &PictureArgs, flag: &str, values: &[String]) -> Result<Params> {
+    let replaced = values.iter().map(|value| Override { flag: flag.into(), assignment: value.clone() });
+    scene::load(path, &overrides(None, args.quality, &args.scene).chain(replaced).collect::<Vec<_>>())
+}
+
 /// The same for commands that make no picture.
 pub fn load_with_quality(path: &Path, quality: Option<QualityArg>, args: &SceneArgs) -> Result<Params> {
-    load_over(None, path, quality, args)
+    scene::load(path, &overrides(None, quality, args).collect::<Vec<_>>())
 }
 
 /// The same with targets of 32-bit floats unless `--set quality.precision` says otherwise: for comparisons.
 pub fn load_precise(path: &Path, args: &PictureArgs) -> Result<Params> {
     let precision = Override { flag: "--set".into(), assignment: "quality.precision=f32".into() };
-    load_over(Some(precision), path, args.quality, &args.scene)
+    scene::load(path, &overrides(Some(precision), args.quality, &args.scene).collect::<Vec<_>>())
 }
 
-fn load_over(first: Option<Override>, path: &Path, quality: Option<QualityArg>, args: &SceneArgs) -> Result<Params> {
+fn overrides(
+    first: Option<Override>,
+    quality: Option<QualityArg>,
+    args: &SceneArgs,
+) -> impl Iterator<Item = Override> + '_ {
     // The preset comes before --set, which can still change a part of it.
     let preset =
         quality.map(|q| Override { flag: "--quality".into(), assignment: format!("quality.preset={}", q.name()) });
-    let overrides: Vec<_> = first.into_iter().chain(preset).chain(sets(args)).collect();
-    scene::load(path, &overrides)
+    first.into_iter().chain(preset).chain(sets(args))
 }
 
 /// `params` with the compositing mode that `flag` chose, if it chose one.

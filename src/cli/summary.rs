@@ -18,6 +18,15 @@ pub fn p95(values: &[f64]) -> Option<f64> {
     sorted.get(rank.checked_sub(1)?).copied()
 }
 
+/// Two of the values between which the median of all that they were drawn from lies with 95 % (order statistics; the binomial
+/// distribution by its normal approximation); the extremes of fewer than eight; `None` of nothing.
+pub fn median_bounds(values: &[f64]) -> Option<[f64; 2]> {
+    let sorted = sorted(values);
+    let n = sorted.len() as f64;
+    let first = (0.5 * n - 0.98 * n.sqrt()).floor().max(0.0) as usize;
+    Some([*sorted.get(first)?, *sorted.get(sorted.len().checked_sub(first + 1)?)?])
+}
+
 fn sorted(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -56,5 +65,10 @@ mod tests {
         assert_eq!(p95(&[7.0]), Some(7.0));
         let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
         assert_eq!(p95(&hundred), Some(95.0));
+        assert_eq!(median_bounds(&[]), None);
+        assert_eq!(median_bounds(&[7.0]), Some([7.0, 7.0]));
+        assert_eq!(median_bounds(&[3.0, 1.0, 2.0]), Some([1.0, 3.0]));
+        // The 41st and the 60th of a hundred hold the median with 94.3 %, by the binomial distribution.
+        assert_eq!(median_bounds(&hundred), Some([41.0, 60.0]));
     }
 }
