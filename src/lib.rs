@@ -160,8 +160,8 @@
 //! - **Light that particles scatter diffuses through all of them**: the diffusion equation is solved in voxels around the
 //!   camera, and shading looks its solution up where the eye looks (`docs/lighting.md`). In the paper particles see each other
 //!   as occluders only. (`tests/light_volume.rs`)
-//! - **Sunlight for a particle's own scattering fades as diffusion lets it**, 1 / (1 + ξ τ), and what comes straight from the sun
-//!   as exp(−τ). The paper dims all of it by exp(−ξ τ), which is an option (`clouds.transfer`) that does without the voxels.
+//! - **Sunlight for a particle's own multiple scattering fades as exp(−ξ τ), ξ = 0.02**, and what comes straight from the sun
+//!   as exp(−τ). The paper dims all of it by exp(−ξ τ), ξ = 0.05, which is an option (`clouds.transfer`) that does without the voxels.
 //!   `docs/accuracy.md` tells what both gain against path tracing. (`src/reference/lighting.rs::alone_a_particle_keeps_all_its_light_and_in_shade_less_and_less`,
 //!   `tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height`)
 //! - **No smoothing by default**: against path tracing it gains nothing once light fades as above.

@@ -69,7 +69,7 @@ Segment particle_segment(uint index, vec2 pixel) {
         ParticleLight light = lights.elements[index];
         float diffused = 0.0;
         if (light.crowd > 0.0) {
-            float seen = s.t_enter + min(3.0 / sigma, 1.0 / volume.params.vacuum);
+            float seen = s.t_enter + min(2.5 / sigma, 1.0 / volume.params.vacuum);
             diffused = light.crowd * volume_radiance(light_volume, f.camera + seen * dir);
         }
         s.colour = shade_tables(medium.params, sky_light.params, light, scattering_lut, f, p, ray, normal_us,

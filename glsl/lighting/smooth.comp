@@ -24,8 +24,9 @@ layout(push_constant) uniform SmoothPush {
     float smoothing;     // weight of a neighbour against 1 of the particle itself; 0: none
 } push;
 
+// Nothing is smoothed by default, and nothing read for it.
 void add(uint slot, float share, inout vec3 weighted, inout float weights) {
-    if (slot >= counters.count.stored) return;
+    if (share <= 0.0 || slot >= counters.count.stored) return;
     float weight = share * particles.particle[slot].density * particles.particle[slot].fade;
     weighted += weight * sun.at[slot].diffuse;
     weights += weight;

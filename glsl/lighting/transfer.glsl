@@ -15,21 +15,18 @@ struct SunShares {
 // tau: optical depths of the other particles in front of the pole facing the sun, the centre and the far pole; own: of
 // this one, from pole to pole; xi: `clouds.xi`; voxel: edge of a voxel, in half chords of the particle along the light.
 //
-// Diffusion. Light that is scattered without loss fades in a cloud as 1 / (1 + c τ), c = 3/4 (1 - g) for a layer
-// (Bohren 1987), not exponentially. That is what is left for the scattering of one particle; light that its neighbours have
-// scattered is in the volume (volume/start.comp), and so is its own where voxels are much smaller than it. Alone (τ = 0) a
-// particle of a list keeps all its light, gets none from others, and the tables hold.
+// Diffusion. What feeds a particle's own multiple scattering fades slowly, because light that has been scattered forward is
+// still there. Light that its neighbours have scattered is in the volume (volume/start.comp), and so is its own where voxels
+// are much smaller than it. Alone (τ = 0) a particle of a list keeps all its light, gets none from others, and the tables hold.
 SunShares sun_shares(vec3 tau, float own, float xi, float voxel, uint transfer) {
-    if (transfer == TRANSFER_EXPONENTIAL) {
-        vec3 share = exp(-xi * tau);
-        return SunShares(share, 0.0, share);
-    }
+    vec3 fading = exp(-xi * tau);
+    if (transfer == TRANSFER_EXPONENTIAL) return SunShares(fading, 0.0, fading);
     float behind = max(tau.z - tau.x, 0.0);
     float alone = own / max(behind + own, 1e-6);
     float alone2 = alone * alone, alone4 = alone2 * alone2;   // a few neighbours make a crowd
     // A particle smaller than a voxel is next to nothing of what is there, and sees it all.
     float large = min(1.0 / (voxel * voxel), 1.0);
-    return SunShares(mix(min(voxel, 1.0), 1.0, alone4) / (1.0 + xi * tau), 1.0 - large * alone4 * alone2, exp(-tau));
+    return SunShares(mix(min(voxel, 1.0), 1.0, alone4) * fading, 1.0 - large * alone4 * alone2, exp(-tau));
 }
 
 #endif

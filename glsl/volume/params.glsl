@@ -20,9 +20,9 @@ struct VolumeParams {
     float shade;             // optical depth over what light lists count, which know ellipsoids without detail
     float body;              // radius, in a particle's, of the ball that holds its matter once detail is taken off [1]
     float vacuum;            // what fills empty space: see volume/start.comp [1/m]
+    float inverse_reach;     // 1 / half of the finest level's width [1/m]
     float reserved_a;
     float reserved_b;
-    float reserved_c;
     vec4  corner[VOLUME_LEVELS]; // least x, least z [m, floating origin]; edge of a voxel [m]; 1 / edge
     ivec4 stack[VOLUME_LEVELS];  // x, z of the voxel in which the next finer level begins, which covers dim / 2; first layer in
                                  // the stack of all levels, layers

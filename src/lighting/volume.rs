@@ -51,8 +51,10 @@ pub struct VolumeParams {
     pub medium: VolumeMedium,
     /// [`VACUUM`].
     pub vacuum: f32,
+    /// 1 / half of the finest level's width [1/m].
+    pub inverse_reach: f32,
     /// Zero.
-    pub reserved: [f32; 3],
+    pub reserved: [f32; 2],
     /// Least x, least z of each level [m, floating origin]; edge of a voxel [m]; 1 / edge.
     pub corner: [[f32; 4]; LEVEL_CAPACITY],
     /// Of each level: voxel (x, z) in which the next finer one begins; first layer in the stack of all levels; layers.
@@ -60,7 +62,8 @@ pub struct VolumeParams {
 }
 assert_layout!(VolumeParams, volume_params, {
     to_sun: TO_SUN, base: BASE, bend: BEND, inverse_diameter: INVERSE_DIAMETER, height: HEIGHT, levels: LEVELS, dim: DIM,
-    layers: LAYERS, medium: EXTINCTION, vacuum: VACUUM, reserved: RESERVED_A,
+    layers: LAYERS, medium: EXTINCTION, vacuum: VACUUM,
+    inverse_reach: INVERSE_REACH, reserved: RESERVED_A,
     corner: CORNER, stack: STACK,
 });
 
@@ -81,7 +84,7 @@ pub struct VolumeDesign {
 
 /// Edge of a voxel in cells of the innermost ring, and layers of voxels a cell. A deck is lit through its layers: with as
 /// few of them as there are cells, twice too much light comes through.
-const CELLS_PER_VOXEL: f64 = 1.5;
+const CELLS_PER_VOXEL: f64 = 2.0;
 const LAYERS_PER_CELL: f64 = 3.0;
 
 impl VolumeDesign {
@@ -89,7 +92,7 @@ impl VolumeDesign {
     /// `cells` in a row.
     #[must_use]
     pub fn of_layer(cell: f64, cells: u32, cutoff: f64, thickness: f64) -> Self {
-        let dim = (cells / 3).clamp(16, 96) / 4 * 4;
+        let dim = (cells / 4).clamp(16, 96) / 4 * 4;
         let doublings = (2.0 * cutoff / (f64::from(dim) * CELLS_PER_VOXEL * cell)).log2().ceil().max(0.0);
         let inside = (thickness / (cell / LAYERS_PER_CELL)).ceil().clamp(1.0, 32.0);
         Self {
@@ -162,6 +165,7 @@ impl VolumeDesign {
             layers: self.stacked(),
             medium: *medium,
             vacuum: VACUUM,
+            inverse_reach: (2.0 / (f64::from(self.dim) * self.edge)) as f32,
             ..params
         }
     }
@@ -247,13 +251,20 @@ struct LevelPush {
     over_relaxation: f32,
 }
 
-/// Sweeps over the coarsest level, which starts from darkness.
-const FIRST_SWEEPS: u32 = 40;
-/// Sweeps over each other level, which starts from the coarser one's solution.
-const SWEEPS: u32 = 6;
-/// Spectral radius of the iteration without over-relaxation that is reckoned with.
-const FIRST_RADIUS: f32 = 0.99;
-const RADIUS: f32 = 0.95;
+/// How a level is relaxed.
+#[derive(Clone, Copy)]
+struct Relaxation {
+    sweeps: u32,
+    /// Spectral radius of the iteration without over-relaxation that is reckoned with.
+    radius: f32,
+}
+
+/// The only level, of a list of particles: it starts from darkness, and light has to cross all of it.
+const ONLY: Relaxation = Relaxation { sweeps: 40, radius: 0.99 };
+/// The coarsest level of a sky: it starts from darkness too, but its voxels are kilometres wide.
+const COARSEST: Relaxation = Relaxation { sweeps: 16, radius: 0.95 };
+/// Each other level, which starts from the coarser one's solution.
+const FINER: Relaxation = Relaxation { sweeps: 6, radius: 0.95 };
 
 /// The voxels, and the light in them.
 pub struct LightVolume {
@@ -386,9 +397,12 @@ impl LightVolume {
                 &push,
                 [dim, dim, layers],
             )?;
-            let sweeps = if level + 1 == levels { FIRST_SWEEPS } else { SWEEPS };
+            let Relaxation { sweeps, radius } = match level {
+                0 if levels == 1 => ONLY,
+                _ if level + 1 == levels => COARSEST,
+                _ => FINER,
+            };
             // Chebyshev's choice of the over-relaxation, which begins with none (Golub and Varga 1961).
-            let radius = if level + 1 == levels { FIRST_RADIUS } else { RADIUS };
             let mut over_relaxation = 1.0;
             for half in 0..2 * sweeps {
                 let push = LevelPush { colour: half & 1, over_relaxation, ..push };
@@ -402,7 +416,7 @@ impl LightVolume {
                 over_relaxation = 1.0 / (1.0 - radius * radius * share);
             }
         }
-        let bindings = store::Bindings { volume: params, light, light_volume: &self.image };
+        let bindings = store::Bindings { volume: params, light, matter, light_volume: &self.image };
         rec.dispatch(&self.store, &bindings, &(), [dim, dim, self.design.stacked()])
     }
 }

@@ -109,7 +109,7 @@ pub enum Lighting {
 /// How the sunlight that reaches a particle depends on the optical depth τ of the particles in front of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
-    /// What comes straight from the sun fades as exp(-τ), what feeds a particle's own multiple scattering as 1 / (1 + ξ τ),
+    /// What comes straight from the sun fades as exp(-τ), what feeds a particle's own multiple scattering as exp(-ξ τ),
     /// and what all particles scatter diffuses through all of them (`docs/lighting.md`).
     Diffusion,
     /// All of it fades as exp(-ξ τ) (Yusov 5.3).
@@ -121,7 +121,7 @@ impl Transfer {
     #[must_use]
     pub fn xi(self) -> f32 {
         match self {
-            Self::Diffusion => 0.03,
+            Self::Diffusion => 0.02,
             Self::Exponential => 0.05,
         }
     }

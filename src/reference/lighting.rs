@@ -58,17 +58,15 @@ pub struct SunShares {
 /// of the voxels in which light diffuses, in half chords of the particle along the light.
 #[must_use]
 pub fn sun_shares(tau: [f64; 3], own: f64, xi: f64, voxel: f64, transfer: Transfer) -> SunShares {
+    let fading = tau.map(|tau| (-xi * tau).exp());
     match transfer {
-        Transfer::Exponential => {
-            let share = tau.map(|tau| (-xi * tau).exp());
-            SunShares { diffuse: share, crowd: 0.0, direct: share }
-        }
+        Transfer::Exponential => SunShares { diffuse: fading, crowd: 0.0, direct: fading },
         Transfer::Diffusion => {
             let alone = own / ((tau[2] - tau[0]).max(0.0) + own).max(1e-6);
             let large = (1.0 / (voxel * voxel)).min(1.0);
             let kept = voxel.min(1.0) + alone.powi(4) * (1.0 - voxel.min(1.0));
             SunShares {
-                diffuse: tau.map(|tau| kept / (1.0 + xi * tau)),
+                diffuse: fading.map(|share| kept * share),
                 crowd: 1.0 - large * alone.powi(6),
                 direct: tau.map(|tau| (-tau).exp()),
             }
