@@ -15,9 +15,7 @@ float volume_radiance(sampler3D light_volume, vec3 p_ws) {
     if (volume_inside(place) < 0.0 && int(level) < last) place = volume_place(p_ws, ++level);
     vec2 stack = vec2(volume.params.stack[level].zw);
     float height = ldexp(volume_height(p_ws), -volume_doublings(level));
-    // Filtering stays within the level.
-    place = clamp(place, 0.5, float(volume.params.dim) - 0.5);
-    float up = stack.x + clamp(height, 0.5, stack.y - 0.5);
+    float up = stack.x + clamp(height, 0.5, stack.y - 0.5);   // filtering stays within the level
     return textureLod(light_volume, vec3(place / float(volume.params.dim), up / float(volume.params.layers)), 0.0).x;
 }
 
