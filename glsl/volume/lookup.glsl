@@ -1,22 +1,25 @@
 // Mean radiance of the light that the clouds around a point scatter, per irradiance of the sun [1/sr].
-// The includer declares what volume/place.glsl asks for.
+// The includer declares, under this name, the readonly buffer `volume.params` (VolumeParams).
 #ifndef WELKIN_VOLUME_LOOKUP
 #define WELKIN_VOLUME_LOOKUP
-#include "volume/place.glsl"
+#include "volume/params.glsl"
 
 float volume_radiance(sampler3D light_volume, vec3 p_ws) {
-    // Levels reach twice as far each. Their middles lie up to a voxel apart, so the first guess may be one too fine.
-    vec2 d = abs(p_ws.xz - volume.params.bend);
-    int doublings;
-    frexp(max(d.x, d.y) * volume.params.inverse_reach, doublings);
-    int last = int(volume.params.levels) - 1;
-    uint level = uint(clamp(doublings, 0, last));
-    vec2 place = volume_place(p_ws, level);
-    if (volume_inside(place) < 0.0 && int(level) < last) place = volume_place(p_ws, ++level);
-    vec2 stack = vec2(volume.params.stack[level].zw);
-    float height = ldexp(volume_height(p_ws), -volume_doublings(level));
-    float up = stack.x + clamp(height, 0.5, stack.y - 0.5);   // filtering stays within the level
-    return textureLod(light_volume, vec3(place / float(volume.params.dim), up / float(volume.params.layers)), 0.0).x;
+    vec2 d = p_ws.xz - volume.params.bend;
+    // Levels reach twice as far each: one for each doubling of the distance, which the exponent of a float counts. Their
+    // middles lie up to a voxel apart, so that this may be one too fine.
+    vec2 out_there = abs(d) * volume.params.inverse_reach;
+    int last = int(volume.params.levels) - 1, doublings = (floatBitsToInt(max(out_there.x, out_there.y)) >> 23) - 126;
+    int level = clamp(doublings, 0, last);
+    vec4 to_image = volume.params.across[level];
+    vec2 across = p_ws.xz * to_image.z + to_image.xy, middle = abs(across - 0.5);
+    if (max(middle.x, middle.y) > volume.params.rim && level < last) {
+        to_image = volume.params.across[++level];
+        across = p_ws.xz * to_image.z + to_image.xy;
+    }
+    vec4 up = volume.params.up[level];
+    float height = p_ws.y - volume.params.base + dot(d, d) * volume.params.inverse_diameter;
+    return textureLod(light_volume, vec3(across, clamp(height * up.y + up.x, up.z, up.w)), 0.0).x;
 }
 
 #endif

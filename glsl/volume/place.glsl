@@ -35,10 +35,4 @@ vec2 volume_place(vec3 p_ws, uint level) {
     return (p_ws.xz - volume.params.corner[level].xy) * volume.params.corner[level].w;
 }
 
-// How far a position in a level lies from where the next coarser one is looked at instead [voxels]; negative there.
-float volume_inside(vec2 place) {
-    vec2 middle = abs(place - 0.5 * float(volume.params.dim));
-    return 0.5 * float(volume.params.dim) - 1.5 - max(middle.x, middle.y);   // a filter reaches half a voxel farther
-}
-
 #endif

@@ -45,7 +45,9 @@ void main() {
     while (int(at.z) >= volume.params.stack[level].z + volume.params.stack[level].w) ++level;
     ivec3 voxel = ivec3(at.x, int(at.z) - volume.params.stack[level].z, at.y);
     float four_pi_radiance = shine(voxel, level);
-    float own = (volume_inside(vec2(at.xy) + 0.5) - 0.5) / BLEND;
+    // A look-up filters half a voxel farther out.
+    vec2 middle = abs((vec2(at.xy) + 0.5) / float(volume.params.dim) - 0.5);
+    float own = ((volume.params.rim - max(middle.x, middle.y)) * float(volume.params.dim) - 0.5) / BLEND;
     if (own < 1.0 && level + 1u < volume.params.levels) {
         four_pi_radiance = mix(coarser_shine(voxel, level), four_pi_radiance, max(own, 0.0));
     }
