@@ -57,7 +57,7 @@ void main() {
 
     // Slivers go to the voxels next to them, as matter above and below the box does: they hold next to nothing, and would be
     // a third of the work.
-    vec3 core = max(0.8 * reach, reach - 0.25);
+    vec3 core = max(reach - 0.25, 0.0);
     ivec3 most = ivec3(volume.params.dim, volume.params.stack[level].w, volume.params.dim) - 1;
     ivec3 first = clamp(ivec3(floor(at - core)), ivec3(0), most), last = clamp(ivec3(floor(at + core)), ivec3(0), most);
     vec3 inverse_reach = 1.0 / reach;
