@@ -332,7 +332,11 @@ impl Renderer {
                 to_sun,
             };
             let medium = VolumeMedium::with_mean(clouds, fill, self.mean_profile);
-            rec.pass("light volume", |rec| self.volume.record(rec, &place, &medium, set, self.lighting.sun_depths()))?;
+            let (volume, frame_buffer) = (&self.volume, &self.frame[slot]);
+            rec.pass("light volume", |rec| {
+                volume.record(rec, &place, &medium, set, self.lighting.sun_depths())?;
+                volume.record_seen(rec, frame_buffer, set, &self.compact)
+            })?;
         } else {
             self.volume.record_none(rec);
         }

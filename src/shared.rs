@@ -54,12 +54,17 @@ pub struct ParticleLight {
     pub direct: [f32; 3],
     /// How much the particle sees of what its neighbours scatter: 0 alone, 1 in the depth of a crowd.
     pub crowd: f32,
+    /// What it sees of it as the eye looks through it, per irradiance of the sun: gradient [1/(m sr)], value at the floating
+    /// origin [1/sr]. Of visible particles alone.
+    pub others: [f32; 4],
 }
-assert_layout!(ParticleLight, particle_light, { diffuse: DIFFUSE, ambient: AMBIENT, direct: DIRECT, crowd: CROWD });
+assert_layout!(ParticleLight, particle_light, {
+    diffuse: DIFFUSE, ambient: AMBIENT, direct: DIRECT, crowd: CROWD, others: OTHERS,
+});
 
 impl ParticleLight {
     /// Nothing between the particle and the sun, nor the sky.
-    pub const OPEN: Self = Self { diffuse: [1.0; 3], ambient: 1.0, direct: [1.0; 3], crowd: 0.0 };
+    pub const OPEN: Self = Self { diffuse: [1.0; 3], ambient: 1.0, direct: [1.0; 3], crowd: 0.0, others: [0.0; 4] };
 }
 
 /// The view, the sun and the medium of one frame (`glsl/common/frame.glsl`).

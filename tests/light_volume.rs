@@ -176,7 +176,7 @@ fn a_deck_lets_through_what_diffusion_does() {
         let set = ParticleSet::new(&gpu, list.count()).unwrap();
         device.frames().run(|rec| rec.pass("grid", |rec| list.record(rec, [0.0; 3], &set))).unwrap();
         let depths = Buffer::upload(&gpu, "depths", &vec![[0.0f32; 4]; particles.len()]).unwrap();
-        let design = VolumeDesign { dim: 32, layers: 27, levels: 1, edge: 1000.0, height: 42.0 };
+        let design = VolumeDesign { dim: 32, layers: 27, levels: 1, edge: 1000.0, height: 42.0, fitted: false };
         let to_sun = [0.0, 1.0, 0.0];
         let place =
             Place { centre: [0.0; 3], origin: [0.0; 3], base: 1000.0 - 20.0, planet_radius: f64::INFINITY, to_sun };

@@ -1,5 +1,6 @@
 // The segment that a particle cuts out of the view ray of a pixel. Included after the bindings that it reads.
 #include "volume/lookup.glsl"
+#include "volume/seen.glsl"
 layout(constant_id = 0) const uint LIGHTING = LIGHTING_TABLES;
 layout(constant_id = 1) const uint HOMOGENEOUS = 0;   // 1: density 1 everywhere inside, no table and no detail
 
@@ -64,16 +65,21 @@ Segment particle_segment(uint index, vec2 pixel) {
         }
         vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
         float tau_chord = sigma * (t_exit - t_enter);
-        // What others have scattered, as deep as the eye looks: most of a transport mean free path behind the surface. That may
-        // be beyond the particle, for light of what stands behind goes through it nearly forward.
         ParticleLight light = lights.elements[index];
-        float diffused = 0.0;
+        float others = 0.0;   // what others have scattered
         if (light.crowd > 0.0) {
-            float seen = s.t_enter + min(2.5 / sigma, 1.0 / volume.params.vacuum);
-            diffused = light.crowd * volume_radiance(light_volume, f.camera + seen * dir);
+            float seen = s.t_enter + seen_depth(sigma);
+            if (volume.params.fitted == 1u) {
+                // The fit holds near its middle (volume/seen.comp).
+                float middle = ray.t_closest - ray.metres + seen_depth(f.sigma_t * p.density * p.fade * f.fill);
+                seen = clamp(seen, middle - 0.5 * ray.metres, middle + 0.5 * ray.metres);
+                others = max(dot(light.others.xyz, f.camera + seen * dir) + light.others.w, 0.0);
+            } else {
+                others = light.crowd * volume_radiance(light_volume, f.camera + seen * dir);
+            }
         }
         s.colour = shade_tables(medium.params, sky_light.params, light, scattering_lut, f, p, ray, normal_us,
-                                dir, normal_ws, tau_chord, matter.y + depth, diffused);
+                                dir, normal_ws, tau_chord, matter.y + depth, others);
     }
     return s;
 }

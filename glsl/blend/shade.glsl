@@ -34,7 +34,7 @@ const uint LIGHTING_FLAT = 1u;
 // Mean source function of sunlight and skylight along the ray: the colour C of the segment.
 // `entry_us` is where the lit surface lies and `mu` the cosine of incidence, after detail has moved both.
 vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sampler3D scattering, FrameParams frame, Particle p,
-                  BallRay ray, vec3 entry_us, vec3 dir, vec3 normal_ws, float tau_chord, float first_matter, float diffused) {
+                  BallRay ray, vec3 entry_us, vec3 dir, vec3 normal_ws, float tau_chord, float first_matter, float others) {
     vec3 to_sun_us = normalize(to_unit_ball(p, vec4(frame.to_sun, 0.0)));
     float mu = max(-dot(entry_us, ray.dir_us), 1e-3);
     // Single scattering: of the homogeneous sphere in which this chord has this optical depth.
@@ -50,7 +50,7 @@ vec3 shade_tables(MediumParams medium, SkyLight sky, ParticleLight light, sample
     vec3 share = vec3(towards, 1.0 - towards - away, away);
     vec3 sunlight = sky.sun_irradiance_clouds * (medium.albedo * p_sun * single * dot(light.direct, share)
                                                  + multiple * dot(light.diffuse, share)
-                                                 + diffused);
+                                                 + others);
 
     // Sky and ground as two half-spheres of constant radiance E / π, seen by the surface; creases, which lie deep below the
     // ellipsoid, are brighter than edges (Yusov 4.4). Where neighbouring cloud stands before the sky, it shines instead

@@ -35,6 +35,6 @@ void main() {
     if (visited > params.tiling.traversal_limit) atomicAdd(counters.count.truncated, 1u);
     float own = 2.0 * reach * params.tiling.extinction * particle.density;
     SunShares shares = sun_shares(optical_depths, own, push.xi, push.voxel / reach, push.transfer);
-    sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, shares.crowd);
+    sun.at[index] = ParticleLight(shares.diffuse, 1.0, shares.direct, shares.crowd, vec4(0.0));
     sun_depths.at[index] = vec4(optical_depths, own);
 }

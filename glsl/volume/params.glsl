@@ -22,7 +22,7 @@ struct VolumeParams {
     float vacuum;            // what fills empty space: see volume/start.comp [1/m]
     float inverse_reach;     // 1 / half of the finest level's width [1/m]
     float rim;               // beyond this distance from the middle of a level the next coarser one is looked up [levels]
-    float reserved_a;
+    uint  fitted;            // 1: particles are smaller than voxels, and each has a linear fit of what it sees (volume/seen.comp)
     vec4  corner[VOLUME_LEVELS]; // least x, least z [m, floating origin]; edge of a voxel [m]; 1 / edge
     ivec4 stack[VOLUME_LEVELS];  // x, z of the voxel in which the next finer level begins, which covers dim / 2; first layer in
                                  // the stack of all levels, layers

@@ -8,7 +8,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;
 layout(set = 0, binding = 1, std430) readonly restrict buffer Light { vec2 voxel[]; } light;
 layout(set = 0, binding = 2, std430) readonly restrict buffer Matter { uvec2 voxel[]; } matter;
-layout(set = 0, binding = 3, r16f) writeonly restrict uniform image3D light_volume;
+layout(set = 0, binding = 3, std430) writeonly restrict buffer Radiance { float voxel[]; } radiance;   // the same as numbers
+layout(set = 0, binding = 4, r16f) writeonly restrict uniform image3D light_volume;
 
 #include "volume/place.glsl"
 
@@ -51,5 +52,7 @@ void main() {
     if (own < 1.0 && level + 1u < volume.params.levels) {
         four_pi_radiance = mix(coarser_shine(voxel, level), four_pi_radiance, max(own, 0.0));
     }
-    imageStore(light_volume, ivec3(at), vec4(max(four_pi_radiance, 0.0) * 0.07957747154594767));
+    float here = max(four_pi_radiance, 0.0) * 0.07957747154594767;
+    radiance.voxel[voxel_index(level, voxel)] = here;
+    imageStore(light_volume, ivec3(at), vec4(here));
 }

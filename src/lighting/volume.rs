@@ -11,14 +11,15 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::Result;
+use crate::compact::Compact;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Image, ImageDesc, Recorder};
 use crate::grid::ParticleSet;
 use crate::params::{Clouds, Style};
 use crate::reference::optical_depth::profile_density;
 use crate::reference::phase::PhaseFunction;
 use crate::shaders::{
-    volume_reduce_comp as reduce, volume_relax_comp as relax, volume_splat_comp as splat, volume_start_comp as start,
-    volume_store_comp as store,
+    volume_reduce_comp as reduce, volume_relax_comp as relax, volume_seen_comp as seen, volume_splat_comp as splat,
+    volume_start_comp as start, volume_store_comp as store,
 };
 use crate::shared::assert_layout;
 
@@ -57,8 +58,8 @@ pub struct VolumeParams {
     pub inverse_reach: f32,
     /// Beyond this distance from the middle of a level the next coarser one is looked up [levels].
     pub rim: f32,
-    /// Zero.
-    pub reserved: f32,
+    /// 1: particles are smaller than voxels, and each has a linear fit of what it sees ([`VolumeDesign::fitted`]).
+    pub fitted: u32,
     /// Least x, least z of each level [m, floating origin]; edge of a voxel [m]; 1 / edge.
     pub corner: [[f32; 4]; LEVEL_CAPACITY],
     /// Of each level: voxel (x, z) in which the next finer one begins; first layer in the stack of all levels; layers.
@@ -71,7 +72,7 @@ pub struct VolumeParams {
 assert_layout!(VolumeParams, volume_params, {
     to_sun: TO_SUN, base: BASE, bend: BEND, inverse_diameter: INVERSE_DIAMETER, height: HEIGHT, levels: LEVELS, dim: DIM,
     layers: LAYERS, medium: EXTINCTION, vacuum: VACUUM,
-    inverse_reach: INVERSE_REACH, rim: RIM, reserved: RESERVED_A,
+    inverse_reach: INVERSE_REACH, rim: RIM, fitted: FITTED,
     corner: CORNER, stack: STACK, across: ACROSS, up: UP,
 });
 
@@ -88,6 +89,8 @@ pub struct VolumeDesign {
     pub edge: f64,
     /// Height of a voxel of the two finest levels [m]; it doubles from each other level to the next.
     pub height: f64,
+    /// Whether particles are smaller than voxels: then light is looked up once for each particle, not in every pixel.
+    pub fitted: bool,
 }
 
 /// Edge of a voxel in cells of the innermost ring, and layers of voxels a cell. A deck is lit through its layers: with as
@@ -109,6 +112,7 @@ impl VolumeDesign {
             levels: (doublings as u32 + 1).min(LEVEL_CAPACITY as u32),
             edge: CELLS_PER_VOXEL * cell,
             height: thickness / inside,
+            fitted: true,
         }
     }
 
@@ -121,13 +125,13 @@ impl VolumeDesign {
         let edge = (widest / f64::from(DIM - 4)).max(greatest / 5.0);
         let inside = (extent[1] / edge).ceil().clamp(1.0, 62.0);
         let height = edge.max(extent[1] / inside);
-        Self { dim: DIM, layers: inside as u32 + 2, levels: 1, edge, height }
+        Self { dim: DIM, layers: inside as u32 + 2, levels: 1, edge, height, fitted: false }
     }
 
     /// No voxels at all.
     #[must_use]
     pub fn none() -> Self {
-        Self { dim: 0, layers: 0, levels: 0, edge: 1.0, height: 1.0 }
+        Self { dim: 0, layers: 0, levels: 0, edge: 1.0, height: 1.0, fitted: false }
     }
 
     /// Layers of a level.
@@ -181,6 +185,7 @@ impl VolumeDesign {
             layers: self.stacked(),
             medium: *medium,
             vacuum: VACUUM,
+            fitted: self.fitted.into(),
             rim: (0.5 - RIM / f64::from(self.dim)) as f32,
             inverse_reach: (2.0 / (f64::from(self.dim) * self.edge)) as f32,
             ..params
@@ -291,10 +296,12 @@ pub struct LightVolume {
     start: ComputePipeline,
     relax: ComputePipeline,
     store: ComputePipeline,
+    seen: ComputePipeline,
     params: Vec<Buffer>,
     matter: Buffer,
     light: Buffer,
     drive: Buffer,
+    radiance: Buffer,
     image: Image,
 }
 
@@ -317,10 +324,12 @@ impl LightVolume {
             start: ComputePipeline::new(gpu, &start::PROGRAM, &[])?,
             relax: ComputePipeline::new(gpu, &relax::PROGRAM, &[])?,
             store: ComputePipeline::new(gpu, &store::PROGRAM, &[])?,
+            seen: ComputePipeline::new(gpu, &seen::PROGRAM, &[])?,
             params,
             matter: Buffer::array::<[u32; 2]>(gpu, "volume matter", voxels)?,
             light: Buffer::array::<[f32; 2]>(gpu, "volume light", voxels)?,
             drive: Buffer::array::<[f32; 2]>(gpu, "volume drive", voxels)?,
+            radiance: Buffer::array::<f32>(gpu, "volume radiance", voxels)?,
             image: Image::new(
                 gpu,
                 &ImageDesc {
@@ -381,7 +390,7 @@ impl LightVolume {
     ) -> Result<()> {
         let params = &self.params[rec.slot()];
         params.write(0, &[self.design.frame(place, medium)]);
-        let (matter, light, drive) = (&self.matter, &self.light, &self.drive);
+        let (matter, light, drive, radiance) = (&self.matter, &self.light, &self.drive, &self.radiance);
         let VolumeDesign { dim, levels, .. } = self.design;
         rec.fill_buffer(matter, 0, matter.size(), 0);
         rec.dispatch_indirect(
@@ -433,7 +442,36 @@ impl LightVolume {
                 over_relaxation = 1.0 / (1.0 - radius * radius * share);
             }
         }
-        let bindings = store::Bindings { volume: params, light, matter, light_volume: &self.image };
+        let bindings = store::Bindings { volume: params, light, matter, radiance, light_volume: &self.image };
         rec.dispatch(&self.store, &bindings, &(), [dim, dim, self.design.stacked()])
+    }
+
+    /// Records what each visible particle shows of the light, once [`Self::record`] has found it: in its
+    /// [`ParticleLight`](crate::shared::ParticleLight).
+    pub fn record_seen(
+        &self,
+        rec: &mut Recorder<'_>,
+        frame: &Buffer,
+        set: &ParticleSet,
+        compact: &Compact,
+    ) -> Result<()> {
+        if !self.design.fitted {
+            return Ok(());
+        }
+        rec.dispatch_indirect(
+            &self.seen,
+            &seen::Bindings {
+                volume: &self.params[rec.slot()],
+                frame,
+                counters: set.counters(),
+                particles: set.particles(),
+                order: compact.order(),
+                lights: set.lights(),
+                radiance: &self.radiance,
+            },
+            &(),
+            compact.args(),
+            Compact::VISIBLE_ARGS,
+        )
     }
 }
