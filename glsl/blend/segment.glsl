@@ -72,7 +72,7 @@ Segment particle_segment(uint index, vec2 pixel) {
             if (volume.params.fitted == 1u) {
                 // The fit holds near its middle (volume/seen.comp).
                 float middle = ray.t_closest - ray.metres + seen_depth(f.sigma_t * p.density * p.fade * f.fill);
-                seen = clamp(seen, middle - 0.5 * ray.metres, middle + 0.5 * ray.metres);
+                seen = clamp(seen, middle - 0.25 * ray.metres, middle + 0.25 * ray.metres);
                 others = max(dot(light.others.xyz, f.camera + seen * dir) + light.others.w, 0.0);
             } else {
                 others = light.crowd * volume_radiance(light_volume, f.camera + seen * dir);
