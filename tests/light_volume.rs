@@ -3,20 +3,23 @@
 #[path = "support/clouds.rs"]
 mod clouds;
 
-use clouds::{Setup, Stages, open, read, silent};
+use clouds::{PLANET, Setup, Stages, open, read, silent};
+use glam::DVec3;
 use welkin::gpu::Buffer;
 use welkin::gpu::standalone::Standalone;
 use welkin::grid::{ParticleList, ParticleSet};
-use welkin::lighting::volume::{LightVolume, Place, VolumeDesign, VolumeMedium, VolumeParams};
+use welkin::lighting::volume::{LightVolume, Place, VACUUM, VolumeDesign, VolumeMedium, VolumeParams};
 use welkin::params::{Clouds, ParticleDesc, Style};
+use welkin::reference::lighting::reach;
 use welkin::reference::volume::{Volume, extinction};
-use welkin::shared::Particle;
+use welkin::shared::{Particle, ParticleLight};
 
 /// What a volume holds once `record` has run.
 struct Light {
     params: VolumeParams,
     matter: Vec<[u32; 2]>,
     light: Vec<[f32; 2]>,
+    radiance: Vec<f32>,
 }
 
 fn light(
@@ -32,8 +35,9 @@ fn light(
     let params = design.frame(place, medium);
     let voxels = params.dim * params.dim * params.layers;
     let (matter, light) = (read(device, volume.matter(), voxels), read(device, volume.light(), voxels));
+    let radiance = read(device, volume.radiance(), voxels);
     device.frames().state().forget();
-    Light { params, matter, light }
+    Light { params, matter, light, radiance }
 }
 
 /// A list of particles, with nothing between any of them and the sun.
@@ -75,7 +79,7 @@ fn a_sky_has_the_light_of_the_converged_solution_and_all_of_its_matter() {
             planet_radius: 6.371e6,
             to_sun: setup.to_sun,
         };
-        let Light { params, matter, light } =
+        let Light { params, matter, light, .. } =
             light(&mut device, design, &place, &medium, &stages.set, stages.lighting.sun_depths());
         assert!(params.levels > 2, "the test wants levels in each other: {}", params.levels);
         let volume = Volume(&params);
@@ -111,25 +115,115 @@ fn a_sky_has_the_light_of_the_converged_solution_and_all_of_its_matter() {
     }
 }
 
-/// Boxes follow the camera by two voxels at a time: what is looked at in them must not show it.
-#[test]
-fn light_does_not_jump_when_the_boxes_move() {
+/// The sky of [`Setup`], its voxels and where they lie.
+fn sky(device: &mut Standalone) -> (Setup, Stages, VolumeDesign, VolumeMedium, Place) {
     let setup = Setup::default();
-    let mut device = open();
-    let stages = Stages::new(&device, &setup);
-    stages.run(&mut device, &setup);
+    let stages = Stages::new(device, &setup);
+    stages.run(device, &setup);
     let (clouds, edge) = (&setup.clouds, setup.design().cell_edge());
     let (cutoff, thickness) = (f64::from(clouds.particle_cutoff), f64::from(clouds.thickness));
     let design = VolumeDesign::of_layer(edge, setup.quality.cells, cutoff, thickness);
     let medium = VolumeMedium::new(clouds, 0.8);
+    let place = Place {
+        centre: std::array::from_fn(|i| setup.camera[i] - setup.origin[i]),
+        origin: setup.origin,
+        base: clouds.altitude.into(),
+        planet_radius: PLANET,
+        to_sun: setup.to_sun,
+    };
+    (setup, stages, design, medium, place)
+}
+
+#[test]
+fn voxels_shine_as_in_the_reference() {
+    let mut device = open();
+    let (_, stages, design, medium, place) = sky(&mut device);
+    let found = light(&mut device, design, &place, &medium, &stages.set, stages.lighting.sun_depths());
+    let volume = Volume(&found.params);
+    let fluence: Vec<f64> = found.light.iter().map(|light| f64::from(light[1])).collect();
+    let expected = volume.radiance(&found.matter, &fluence);
+    let brightest = expected.iter().copied().fold(0.0, f64::max);
+    for (index, (&got, &expected)) in found.radiance.iter().zip(&expected).enumerate() {
+        assert!((f64::from(got) - expected).abs() < 1e-5 * brightest, "voxel {index}: {got}, expected {expected}");
+    }
+
+    silent(&device);
+}
+
+#[test]
+fn each_visible_particle_has_value_and_slope_of_the_look_up() {
+    let mut device = open();
+    let (setup, stages, design, medium, place) = sky(&mut device);
+    let gpu = device.gpu().clone();
+    let frame = setup.frame();
+    let frame_buffer = Buffer::upload(&gpu, "frame", &[frame]).unwrap();
+    let volume = LightVolume::new(&gpu, design, 2).unwrap();
+    let depths = stages.lighting.sun_depths();
+    let slot = device
+        .frames()
+        .run(|rec| {
+            rec.pass("volume", |rec| {
+                volume.record(rec, &place, &medium, &stages.set, depths)?;
+                volume.record_seen(rec, &frame_buffer, &stages.set, &stages.compact)
+            })?;
+            stages.counters.record(rec, &stages.set);
+            Ok(rec.slot())
+        })
+        .unwrap();
+    let counters = stages.counters.read(slot);
+    let params = design.frame(&place, &medium);
+    let radiance: Vec<f32> = read(&mut device, volume.radiance(), params.dim * params.dim * params.layers);
+    let radiance: Vec<f64> = radiance.into_iter().map(f64::from).collect();
+    let particles: Vec<Particle> = read(&mut device, stages.set.particles(), counters.stored);
+    let lights: Vec<ParticleLight> = read(&mut device, stages.set.lights(), counters.stored);
+    let order: Vec<u32> = read(&mut device, stages.compact.order(), counters.visible);
+    assert!(counters.visible > 1000 && counters.visible < counters.stored / 2, "the test wants some that are seen");
+
+    let mut seen = vec![false; particles.len()];
+    let camera = DVec3::from(frame.camera.map(f64::from));
+    let brightest = radiance.iter().copied().fold(0.0, f64::max);
+    for index in order.into_iter().map(|index| index as usize) {
+        seen[index] = true;
+        let (particle, light) = (&particles[index], &lights[index]);
+        let centre = DVec3::from(particle.centre.map(f64::from));
+        let view = (centre - camera).normalize();
+        let half_chord = reach(particle, view);
+        let extinction = f64::from(frame.sigma_t * particle.density * particle.fade * frame.fill);
+        let depth = (2.5 / extinction).min(1.0 / f64::from(VACUUM));
+        let middle = centre + (depth - half_chord) * view;
+        let (value, slope) = Volume(&params).look_up(&radiance, middle.into());
+        let crowd = f64::from(light.crowd);
+        let [x, y, z, offset] = light.others.map(f64::from);
+        // Value at the middle and a half chord from it: where slopes jump from cell to cell, rounding may take the other.
+        let got = DVec3::new(x, y, z).dot(middle) + offset;
+        assert!((got - crowd * value).abs() < 3e-4 * brightest, "particle {index}: {got}, expected {}", crowd * value);
+        let steepest = brightest / f64::from(params.height);
+        let difference = (DVec3::new(x, y, z) - crowd * DVec3::from(slope)).length();
+        let edge = (0..3).any(|axis| {
+            let nudged = |by: f64| {
+                let mut point = middle;
+                point[axis] += by;
+                Volume(&params).look_up(&radiance, point.into()).1
+            };
+            nudged(0.05) != slope || nudged(-0.05) != slope
+        });
+        assert!(
+            difference < 1e-3 * steepest || edge,
+            "particle {index}: slope is {difference} off, at most {steepest}"
+        );
+    }
+    let unseen = lights.iter().zip(&seen).filter(|(_, seen)| !**seen);
+    assert!(unseen.map(|(light, _)| light.others).all(|others| others == [0.0; 4]));
+    silent(&device);
+}
+
+/// Boxes follow the camera by two voxels at a time: what is looked at in them must not show it.
+#[test]
+fn light_does_not_jump_when_the_boxes_move() {
+    let mut device = open();
+    let (setup, stages, design, medium, place) = sky(&mut device);
     let mut at = |x: f64| {
-        let place = Place {
-            centre: [x - setup.origin[0], setup.camera[1] - setup.origin[1], setup.camera[2] - setup.origin[2]],
-            origin: setup.origin,
-            base: clouds.altitude.into(),
-            planet_radius: 6.371e6,
-            to_sun: setup.to_sun,
-        };
+        let place = Place { centre: [x - setup.origin[0], place.centre[1], place.centre[2]], ..place };
         light(&mut device, design, &place, &medium, &stages.set, stages.lighting.sun_depths())
     };
     // They move where the camera is half way between two even voxels.
@@ -181,7 +275,7 @@ fn a_deck_lets_through_what_diffusion_does() {
         let place =
             Place { centre: [0.0; 3], origin: [0.0; 3], base: 1000.0 - 20.0, planet_radius: f64::INFINITY, to_sun };
         // No shade: the slab is lit evenly throughout, q = σ. Then φ'' = -3 s q is a parabola between its Marshak ends.
-        let Light { params, matter, light } = light(&mut device, design, &place, &medium, &set, &depths);
+        let Light { params, matter, light, .. } = light(&mut device, design, &place, &medium, &set, &depths);
         let volume = Volume(&params);
         let column: Vec<_> = (0..params.layers as i32).map(|y| volume.index(0, [16, y, 16])).collect();
         let middle = column[column.len() / 2];

@@ -20,15 +20,12 @@ struct VolumeParams {
     float shade;             // optical depth over what light lists count, which know ellipsoids without detail
     float body;              // radius, in a particle's, of the ball that holds its matter once detail is taken off [1]
     float vacuum;            // what fills empty space: see volume/start.comp [1/m]
-    float inverse_reach;     // 1 / half of the finest level's width [1/m]
-    float rim;               // beyond this distance from the middle of a level the next coarser one is looked up [levels]
     uint  fitted;            // 1: particles are smaller than voxels, and each has a linear fit of what it sees (volume/seen.comp)
+    float reserved_a;
+    float reserved_b;
     vec4  corner[VOLUME_LEVELS]; // least x, least z [m, floating origin]; edge of a voxel [m]; 1 / edge
     ivec4 stack[VOLUME_LEVELS];  // x, z of the voxel in which the next finer level begins, which covers dim / 2; first layer in
                                  // the stack of all levels, layers
-    // From positions to those in the image, [0, 1] along each of its axes.
-    vec4  across[VOLUME_LEVELS]; // of x and z: offsets, scale [1/m], 0
-    vec4  up[VOLUME_LEVELS];     // of the height above `base`: offset, scale [1/m]; bounds within which filtering stays in the level
 };
 
 // Extinctions are summed as integers, in any order to the same sum.

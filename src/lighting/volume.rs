@@ -25,8 +25,6 @@ use crate::shared::assert_layout;
 
 /// Levels that the device's struct holds.
 pub const LEVEL_CAPACITY: usize = 8;
-/// Voxels at the border of a level that are not looked up: a filter's reach and a half.
-const RIM: f64 = 1.5;
 /// What fills empty space, as an extinction of isotropic scattering [1/m]: clouds closer than its inverse light each other.
 pub const VACUUM: f32 = 1.0 / 240.0;
 
@@ -54,26 +52,20 @@ pub struct VolumeParams {
     pub medium: VolumeMedium,
     /// [`VACUUM`].
     pub vacuum: f32,
-    /// 1 / half of the finest level's width [1/m].
-    pub inverse_reach: f32,
-    /// Beyond this distance from the middle of a level the next coarser one is looked up [levels].
-    pub rim: f32,
     /// 1: particles are smaller than voxels, and each has a linear fit of what it sees ([`VolumeDesign::fitted`]).
     pub fitted: u32,
+    /// Zero.
+    pub reserved: [f32; 2],
     /// Least x, least z of each level [m, floating origin]; edge of a voxel [m]; 1 / edge.
     pub corner: [[f32; 4]; LEVEL_CAPACITY],
     /// Of each level: voxel (x, z) in which the next finer one begins; first layer in the stack of all levels; layers.
     pub stack: [[i32; 4]; LEVEL_CAPACITY],
-    /// From x and z to the image's axes: offsets, scale [1/m], 0.
-    pub across: [[f32; 4]; LEVEL_CAPACITY],
-    /// The same from the height above `base`: offset, scale [1/m]; bounds within which filtering stays in the level.
-    pub up: [[f32; 4]; LEVEL_CAPACITY],
 }
 assert_layout!(VolumeParams, volume_params, {
     to_sun: TO_SUN, base: BASE, bend: BEND, inverse_diameter: INVERSE_DIAMETER, height: HEIGHT, levels: LEVELS, dim: DIM,
     layers: LAYERS, medium: EXTINCTION, vacuum: VACUUM,
-    inverse_reach: INVERSE_REACH, rim: RIM, fitted: FITTED,
-    corner: CORNER, stack: STACK, across: ACROSS, up: UP,
+    fitted: FITTED, reserved: RESERVED_A,
+    corner: CORNER, stack: STACK,
 });
 
 /// How many voxels there are, and how large.
@@ -134,9 +126,9 @@ impl VolumeDesign {
         Self { dim: 0, layers: 0, levels: 0, edge: 1.0, height: 1.0, fitted: false }
     }
 
-    /// Layers of a level.
+    /// Layers of a level; at least the two that an interpolation takes.
     fn layers_of(&self, level: u32) -> u32 {
-        self.layers.div_ceil(1 << level.saturating_sub(1))
+        self.layers.div_ceil(1 << level.saturating_sub(1)).max(2)
     }
 
     /// Layers of all levels.
@@ -164,15 +156,7 @@ impl VolumeDesign {
                 [params.stack[level][0], params.stack[level][1]] = [begin(0), begin(1)];
             }
             [params.stack[level][2], params.stack[level][3]] = [layer as i32, self.layers_of(level as u32) as i32];
-            let width = 1.0 / (f64::from(self.dim) * edge);
-            let offset = |i: usize, axis: usize| (-(first[level][i] as f64 * edge - place.origin[axis]) * width) as f32;
-            params.across[level] = [offset(0, 0), offset(1, 2), width as f32, 0.0];
-            let (layers, stacked) = (self.layers_of(level as u32), f64::from(self.stacked()));
-            let up = |layer: f64| (layer / stacked) as f32;
-            let scale = 1.0 / (self.height * f64::from(1u32 << level.saturating_sub(1)));
-            let bounds = [f64::from(layer) + 0.5, f64::from(layer + layers) - 0.5];
-            params.up[level] = [up(f64::from(layer)), up(scale), up(bounds[0]), up(bounds[1])];
-            layer += layers;
+            layer += self.layers_of(level as u32);
         }
         VolumeParams {
             to_sun: place.to_sun.map(|c| c as f32),
@@ -186,8 +170,6 @@ impl VolumeDesign {
             medium: *medium,
             vacuum: VACUUM,
             fitted: self.fitted.into(),
-            rim: (0.5 - RIM / f64::from(self.dim)) as f32,
-            inverse_reach: (2.0 / (f64::from(self.dim) * self.edge)) as f32,
             ..params
         }
     }
@@ -334,7 +316,7 @@ impl LightVolume {
                 gpu,
                 &ImageDesc {
                     name: "light volume",
-                    extent: [dim, dim, layers],
+                    extent: if design.fitted { [1; 3] } else { [dim, dim, layers] },
                     format: vk::Format::R16_SFLOAT,
                     usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE,
                 },
@@ -354,7 +336,7 @@ impl LightVolume {
         &self.params[slot]
     }
 
-    /// Mean radiance per irradiance of the sun [1/sr].
+    /// Mean radiance per irradiance of the sun [1/sr], where it is looked up in every pixel ([`VolumeDesign::fitted`]).
     #[must_use]
     pub fn image(&self) -> &Image {
         &self.image
@@ -364,6 +346,12 @@ impl LightVolume {
     #[must_use]
     pub fn light(&self) -> &Buffer {
         &self.light
+    }
+
+    /// Mean radiance per irradiance of the sun [1/sr], voxel by voxel.
+    #[must_use]
+    pub fn radiance(&self) -> &Buffer {
+        &self.radiance
     }
 
     /// Extinction in the first number of each voxel, extinction × sunlight in the second, in units of 2⁻²⁰ 1/m.

@@ -96,4 +96,77 @@ impl Volume<'_> {
         }
         phi
     }
+
+    /// Radiance of every voxel per irradiance of the sun [1/sr], with the share of sunlight that thick voxels scatter for the
+    /// first time (`glsl/volume/store.comp`). `fluence` is [`Self::fluence`]'s or the device's.
+    #[must_use]
+    pub fn radiance(&self, matter: &[[u32; 2]], fluence: &[f64]) -> Vec<f64> {
+        let p = self.0;
+        let (albedo, g, vacuum) = (f64::from(p.medium.albedo), f64::from(p.medium.asymmetry), f64::from(p.vacuum));
+        let mut radiance = vec![0.0; fluence.len()];
+        for level in 0..p.levels as usize {
+            for index in self.voxels(level).map(|voxel| self.index(level, voxel)) {
+                let [sigma, lit] = extinction(matter[index]);
+                let thickness = (sigma * (1.0 - albedo * g)).max(vacuum) * self.size(level)[0];
+                let share = thickness * thickness / (1.0 + thickness * thickness);
+                let fluence = fluence[index] + share * lit / sigma.max(vacuum);
+                radiance[index] = fluence.max(0.0) / (4.0 * std::f64::consts::PI);
+            }
+        }
+        radiance
+    }
+
+    /// `radiance` at a point [m, floating origin], and its slope along the axes [1/(m sr)]: of the finest level that reaches
+    /// so far, passing into the next coarser one towards its border (`glsl/volume/seen.comp`).
+    #[must_use]
+    pub fn look_up(&self, radiance: &[f64], point: [f64; 3]) -> (f64, [f64; 3]) {
+        let last = self.0.levels as usize - 1;
+        let inside = |level: usize| {
+            let [across, _, along] = self.position(level, point);
+            across.min(along).min(f64::from(self.0.dim) - across.max(along)) - 1.5
+        };
+        let level = (0..last).find(|&level| inside(level) > 0.0).unwrap_or(last);
+        let (value, slope) = self.interpolate(radiance, point, level);
+        let own = inside(level) / 4.0;
+        if own >= 1.0 || level == last {
+            return (value, slope);
+        }
+        let (coarser, coarser_slope) = self.interpolate(radiance, point, level + 1);
+        let mix = |coarser: f64, value: f64| coarser + (value - coarser) * own;
+        (mix(coarser, value), std::array::from_fn(|axis| mix(coarser_slope[axis], slope[axis])))
+    }
+
+    /// Where a point [m, floating origin] lies in a level [voxels].
+    fn position(&self, level: usize, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let p = self.0;
+        let [width, height] = self.size(level);
+        let [dx, dz] = [x - f64::from(p.bend[0]), z - f64::from(p.bend[1])];
+        let above = y - f64::from(p.base) + (dx * dx + dz * dz) * f64::from(p.inverse_diameter);
+        let [corner_x, corner_z, ..] = p.corner[level].map(f64::from);
+        [(x - corner_x) / width, above / height, (z - corner_z) / width]
+    }
+
+    fn interpolate(&self, radiance: &[f64], point: [f64; 3], level: usize) -> (f64, [f64; 3]) {
+        let (dim, layers) = (self.0.dim as i32, self.stack(level)[3]);
+        let [width, height] = self.size(level);
+        let at = self.position(level, point);
+        let (mut first, mut part) = ([0i32; 3], [0.0f64; 3]);
+        for (axis, voxels) in [dim, layers, dim].into_iter().enumerate() {
+            let place = at[axis].clamp(0.5, f64::from(voxels) - 0.5) - 0.5;
+            first[axis] = (place.floor() as i32).min(voxels - 2);
+            part[axis] = place - f64::from(first[axis]);
+        }
+        let (mut value, mut slope) = (0.0, [0.0; 3]);
+        for corner in 0..8 {
+            let far = [0, 1, 2].map(|axis| corner >> axis & 1);
+            let here = radiance[self.index(level, [0, 1, 2].map(|axis| first[axis] + far[axis]))];
+            let weight = [0, 1, 2].map(|axis| if far[axis] == 1 { part[axis] } else { 1.0 - part[axis] });
+            value += weight.iter().product::<f64>() * here;
+            for (axis, slope) in slope.iter_mut().enumerate() {
+                let others: f64 = (0..3).filter(|&other| other != axis).map(|other| weight[other]).product();
+                *slope += (if far[axis] == 1 { here } else { -here }) * others / [width, height, width][axis];
+            }
+        }
+        (value, slope)
+    }
 }
