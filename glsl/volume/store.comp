@@ -19,9 +19,11 @@ void main() {
     uint index = (at.z * volume.params.dim + at.y) * volume.params.dim + at.x;
     vec2 sigma = vec2(matter.voxel[index]) / VOLUME_UNITS, s_phi = light.voxel[index];
     // Beside the fluence of scattered light, a share of what the sun scatters here for the first time. Diffusion knows the
-    // mean of that over the voxel; where the voxel is optically thick, it is all at the sunlit side, and seen there.
+    // mean of that over the voxel; where the voxel is optically thick, it is all at the sunlit side, and seen there. A small
+    // cloud in a large voxel, which has little fluence for the light that falls in, loses it at its other sides.
     float thickness = s_phi.x * volume.params.corner[level].z, thickness2 = thickness * thickness;
-    float fluence = s_phi.y + thickness2 / (1.0 + thickness2) * sigma.y / max(sigma.x, volume.params.vacuum);
+    float sunlight = sigma.y / max(sigma.x, volume.params.vacuum);
+    float fluence = s_phi.y + thickness2 / (1.0 + thickness2) * min(sunlight, 0.5 * s_phi.y);
     float value = max(fluence, 0.0) * 0.07957747154594767;   // / 4π
     radiance.voxel[index] = value;
     if (volume.params.fitted == 0u) imageStore(light_volume, ivec3(at), vec4(value));

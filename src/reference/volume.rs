@@ -109,7 +109,7 @@ impl Volume<'_> {
                 let [sigma, lit] = extinction(matter[index]);
                 let thickness = (sigma * (1.0 - albedo * g)).max(vacuum) * self.size(level)[0];
                 let share = thickness * thickness / (1.0 + thickness * thickness);
-                let fluence = fluence[index] + share * lit / sigma.max(vacuum);
+                let fluence = fluence[index] + share * (lit / sigma.max(vacuum)).min(0.5 * fluence[index]);
                 radiance[index] = fluence.max(0.0) / (4.0 * std::f64::consts::PI);
             }
         }
