@@ -158,7 +158,8 @@
 //! - **Light is found at three points of a particle**, both poles towards the sun and the centre: overlapping particles agree on
 //!   the light between them. (`tests/oracle_lighting.rs::no_occluder_is_missed_whatever_the_suns_height` checks all three)
 //! - **Light that particles scatter diffuses through all of them**: the diffusion equation is solved in voxels around the
-//!   camera, and shading looks its solution up where the eye looks (`docs/lighting.md`). In the paper particles see each other
+//!   camera, and shading looks its solution up where the eye looks, with a share of first-scattered light where voxels are
+//!   optically thick (`docs/lighting.md`). In the paper particles see each other
 //!   as occluders only. (`tests/light_volume.rs`)
 //! - **Sunlight for a particle's own multiple scattering fades as exp(−ξ τ), ξ = 0.02**, and what comes straight from the sun
 //!   as exp(−τ). The paper dims all of it by exp(−ξ τ), ξ = 0.05, which is an option (`clouds.transfer`) that does without the voxels.
