@@ -2,7 +2,9 @@
 //! `shaders.rs` (one typed module per program) and `layout.rs` (offset of every member of every shared struct).
 //!
 //! Entry files end in `.comp`, `.vert` or `.frag`; `.glsl` files are includes. A fragment shader names its vertex
-//! shader in a line `// vertex: <path>`, and the two become one program.
+//! shader in a line `// vertex: <path>`, and the two become one program. An entry file with a line `// lighting: each` is
+//! compiled once for each folder `lighting/<method>` that has a `source.glsl`, which takes the place of the include
+//! `lighting/source.glsl`.
 
 #![allow(clippy::expect_used)] // A build script has nobody to return an error to.
 
@@ -26,19 +28,27 @@ fn main() {
     let mut entries = Vec::new();
     collect(&root, &root, &mut entries);
     entries.sort();
+    let lightings = lightings(&root);
 
     let mut modules = Vec::new();
     let mut failed = false;
-    for name in &entries {
-        match compile::compile(&root, name).and_then(|(source, words)| {
+    let variants = entries.iter().flat_map(|name| {
+        let source = fs::read_to_string(root.join(name)).unwrap_or_default();
+        let each = source.lines().any(|line| line == "// lighting: each");
+        let lightings = if each { lightings.iter().cloned().map(Some).collect() } else { vec![None] };
+        lightings.into_iter().map(move |lighting| (name, lighting))
+    });
+    for (name, lighting) in variants {
+        match compile::compile(&root, name, lighting.as_deref()).and_then(|(source, words)| {
             let reflection = reflect::reflect(&words).map_err(|error| format!("glsl/{name}: {error}"))?;
             Ok((source, words, reflection))
         }) {
             Ok((source, words, reflection)) => {
-                let file = format!("{}.spv", emit::identifier(name));
+                let suffix = lighting.as_ref().map(|method| format!("_{method}")).unwrap_or_default();
+                let file = format!("{}{suffix}.spv", emit::identifier(name));
                 let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
                 fs::write(out.join(&file), bytes).expect("OUT_DIR is writable");
-                modules.push(emit::Module { name: name.clone(), file, source, reflection });
+                modules.push(emit::Module { name: name.clone(), lighting, file, source, reflection });
             }
             Err(message) => {
                 failed = true;
@@ -61,6 +71,17 @@ fn main() {
             process::exit(1);
         }
     }
+}
+
+/// The lighting methods that have shaders, sorted.
+fn lightings(root: &Path) -> Vec<String> {
+    let folders = fs::read_dir(root.join("lighting")).expect("glsl/lighting is readable").flatten();
+    let mut names: Vec<_> = folders
+        .filter(|entry| entry.path().join("source.glsl").exists())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
 }
 
 /// Every entry file below `folder`, as a path relative to `root` with forward slashes.

@@ -3,11 +3,34 @@
 use std::fs;
 use std::path::Path;
 
-/// Source text and SPIR-V words of entry file `name`; an error names file and line.
-pub fn compile(root: &Path, name: &str) -> Result<(String, Vec<u32>), String> {
+/// The include that stands for the source function of each lighting method in turn.
+const LIGHTING_SOURCE: &str = "lighting/source.glsl";
+
+/// Source text and SPIR-V words of entry file `name`, for a lighting method if there is one for each; an error names file and
+/// line.
+pub fn compile(root: &Path, name: &str, lighting: Option<&str>) -> Result<(String, Vec<u32>), String> {
     let source = fs::read_to_string(root.join(name)).map_err(|error| format!("glsl/{name}: {error}"))?;
-    let words = backend::compile(root, name, &source).map_err(|log| readable(name, &log))?;
+    let includes = Includes { root, lighting };
+    let words = backend::compile(&includes, name, &source).map_err(|log| readable(name, &log))?;
     Ok((source, words))
+}
+
+/// Where includes lie.
+struct Includes<'a> {
+    root: &'a Path,
+    lighting: Option<&'a str>,
+}
+
+impl Includes<'_> {
+    /// Path and text of the include `header`.
+    fn read(&self, header: &str) -> Result<(String, String), String> {
+        let path = match self.lighting {
+            Some(method) if header == LIGHTING_SOURCE => format!("lighting/{method}/source.glsl"),
+            _ => header.to_owned(),
+        };
+        let text = fs::read_to_string(self.root.join(&path)).map_err(|error| format!("glsl/{path}: {error}"))?;
+        Ok((path, text))
+    }
 }
 
 /// Rewrites the compiler's `ERROR: 0:12:` and `ERROR: common/x.glsl:12:` to `glsl/<file>:12:`.
@@ -39,18 +62,18 @@ mod backend {
         Compiler, CompilerOptions, ShaderInput, ShaderSource, ShaderStage, SourceLanguage, SpirvVersion, Target,
         VulkanVersion,
     };
-    use std::path::Path;
 
-    struct Includes<'a>(&'a Path);
+    use super::Includes;
 
-    impl IncludeHandler for Includes<'_> {
+    struct Handler<'a>(&'a Includes<'a>);
+
+    impl IncludeHandler for Handler<'_> {
         fn include(&mut self, _: IncludeType, header: &str, _: &str, _: usize) -> Option<IncludeResult> {
-            let data = std::fs::read_to_string(self.0.join(header)).ok()?;
-            Some(IncludeResult { name: header.to_owned(), data })
+            self.0.read(header).ok().map(|(name, data)| IncludeResult { name, data })
         }
     }
 
-    pub fn compile(root: &Path, name: &str, source: &str) -> Result<Vec<u32>, String> {
+    pub fn compile(includes: &Includes<'_>, name: &str, source: &str) -> Result<Vec<u32>, String> {
         let compiler = Compiler::acquire().ok_or("glslang could not be initialised")?;
         let stage = match name.rsplit('.').next() {
             Some("comp") => ShaderStage::Compute,
@@ -62,9 +85,9 @@ mod backend {
             target: Target::Vulkan { version: VulkanVersion::Vulkan1_3, spirv_version: SpirvVersion::SPIRV1_6 },
             ..CompilerOptions::default()
         };
-        let mut includes = Includes(root);
+        let mut handler = Handler(includes);
         let source = ShaderSource::from(source);
-        let input = ShaderInput::new(&source, stage, &options, None, Some(&mut includes)).map_err(|e| e.to_string())?;
+        let input = ShaderInput::new(&source, stage, &options, None, Some(&mut handler)).map_err(|e| e.to_string())?;
         let shader = compiler.create_shader(input).map_err(|e| e.to_string())?;
         shader.compile().map_err(|e| e.to_string())
     }
@@ -72,9 +95,9 @@ mod backend {
 
 #[cfg(feature = "shaderc")]
 mod backend {
-    use std::path::Path;
+    use super::Includes;
 
-    pub fn compile(root: &Path, name: &str, source: &str) -> Result<Vec<u32>, String> {
+    pub fn compile(includes: &Includes<'_>, name: &str, source: &str) -> Result<Vec<u32>, String> {
         let compiler = shaderc::Compiler::new().map_err(|error| error.to_string())?;
         let mut options = shaderc::CompileOptions::new().map_err(|error| error.to_string())?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
@@ -82,8 +105,8 @@ mod backend {
         options.set_optimization_level(shaderc::OptimizationLevel::Performance);
         options.set_generate_debug_info(); // Keeps the names that reflection needs.
         options.set_include_callback(|header, _, _, _| {
-            let content = std::fs::read_to_string(root.join(header)).map_err(|error| error.to_string())?;
-            Ok(shaderc::ResolvedInclude { resolved_name: header.to_owned(), content })
+            let (resolved_name, content) = includes.read(header)?;
+            Ok(shaderc::ResolvedInclude { resolved_name, content })
         });
         let kind = match name.rsplit('.').next() {
             Some("comp") => shaderc::ShaderKind::Compute,

@@ -1,11 +1,11 @@
 //! From the cloud targets and the background to the picture: upsampling, compositing, exposure, tone curve.
 
 use crate::Result;
-use crate::blend::cloud_format;
 use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
 use crate::params::{self, Precision, SkyModel, ToneCurve};
 use crate::shaders::{film_composite_comp as composite, film_tonemap_comp as tonemap};
 use crate::shared::assert_layout;
+use crate::targets::cloud_format;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;

@@ -216,6 +216,7 @@ pub mod frame;
 pub mod gpu;
 pub mod grid;
 pub mod lighting;
+pub mod lists;
 pub mod lut;
 #[cfg(feature = "files")]
 pub mod output;
@@ -226,7 +227,11 @@ pub mod renderer;
 #[cfg(feature = "files")]
 pub mod scene;
 pub mod shared;
+pub mod sky;
+mod source;
+mod targets;
 pub mod tiling;
+pub mod view;
 pub mod voxelize;
 
 /// Every shader program, as compiled and reflected by the build.

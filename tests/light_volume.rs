@@ -8,7 +8,7 @@ use glam::DVec3;
 use welkin::gpu::Buffer;
 use welkin::gpu::standalone::Standalone;
 use welkin::grid::{ParticleList, ParticleSet};
-use welkin::lighting::volume::{LightVolume, Place, VACUUM, VolumeDesign, VolumeMedium, VolumeParams};
+use welkin::lighting::tables::volume::{LightVolume, VACUUM, VolumeDesign, VolumeMedium, VolumeParams, VolumePlace};
 use welkin::params::{Clouds, ParticleDesc, Style};
 use welkin::reference::lighting::reach;
 use welkin::reference::volume::{Volume, extinction};
@@ -25,7 +25,7 @@ struct Light {
 fn light(
     device: &mut Standalone,
     design: VolumeDesign,
-    place: &Place,
+    place: &VolumePlace,
     medium: &VolumeMedium,
     set: &ParticleSet,
     sun_depths: &Buffer,
@@ -49,7 +49,7 @@ fn light_of_list(device: &mut Standalone, particles: &[ParticleDesc], medium: &V
     let depths = Buffer::upload(&gpu, "depths", &vec![[0.0, 0.0, 0.0, own]; particles.len()]).unwrap();
     let [least, greatest] = list.bounds();
     let design = VolumeDesign::of_list(std::array::from_fn(|i| greatest[i] - least[i]), list.greatest_extent().into());
-    let place = Place {
+    let place = VolumePlace {
         centre: std::array::from_fn(|i| 0.5 * (least[i] + greatest[i])),
         origin: [0.0; 3],
         base: least[1],
@@ -72,7 +72,7 @@ fn a_sky_has_the_light_of_the_converged_solution_and_all_of_its_matter() {
         let (cutoff, thickness) = (f64::from(clouds.particle_cutoff), f64::from(clouds.thickness));
         let design = VolumeDesign::of_layer(setup.design().cell_edge(), setup.quality.cells, cutoff, thickness);
         let medium = VolumeMedium::new(clouds, 0.8);
-        let place = Place {
+        let place = VolumePlace {
             centre: std::array::from_fn(|i| setup.camera[i] - setup.origin[i]),
             origin: setup.origin,
             base: clouds.altitude.into(),
@@ -116,7 +116,7 @@ fn a_sky_has_the_light_of_the_converged_solution_and_all_of_its_matter() {
 }
 
 /// The sky of [`Setup`], its voxels and where they lie.
-fn sky(device: &mut Standalone) -> (Setup, Stages, VolumeDesign, VolumeMedium, Place) {
+fn sky(device: &mut Standalone) -> (Setup, Stages, VolumeDesign, VolumeMedium, VolumePlace) {
     let setup = Setup::default();
     let stages = Stages::new(device, &setup);
     stages.run(device, &setup);
@@ -124,7 +124,7 @@ fn sky(device: &mut Standalone) -> (Setup, Stages, VolumeDesign, VolumeMedium, P
     let (cutoff, thickness) = (f64::from(clouds.particle_cutoff), f64::from(clouds.thickness));
     let design = VolumeDesign::of_layer(edge, setup.quality.cells, cutoff, thickness);
     let medium = VolumeMedium::new(clouds, 0.8);
-    let place = Place {
+    let place = VolumePlace {
         centre: std::array::from_fn(|i| setup.camera[i] - setup.origin[i]),
         origin: setup.origin,
         base: clouds.altitude.into(),
@@ -164,7 +164,7 @@ fn each_visible_particle_has_value_and_slope_of_the_look_up() {
         .run(|rec| {
             rec.pass("volume", |rec| {
                 volume.record(rec, &place, &medium, &stages.set, depths)?;
-                volume.record_seen(rec, &frame_buffer, &stages.set, &stages.compact)
+                volume.record_seen(rec, &frame_buffer, &stages.set, &stages.compact, stages.lighting.lights())
             })?;
             stages.counters.record(rec, &stages.set);
             Ok(rec.slot())
@@ -175,7 +175,7 @@ fn each_visible_particle_has_value_and_slope_of_the_look_up() {
     let radiance: Vec<f32> = read(&mut device, volume.radiance(), params.dim * params.dim * params.layers);
     let radiance: Vec<f64> = radiance.into_iter().map(f64::from).collect();
     let particles: Vec<Particle> = read(&mut device, stages.set.particles(), counters.stored);
-    let lights: Vec<ParticleLight> = read(&mut device, stages.set.lights(), counters.stored);
+    let lights: Vec<ParticleLight> = read(&mut device, stages.lighting.lights(), counters.stored);
     let order: Vec<u32> = read(&mut device, stages.compact.order(), counters.visible);
     assert!(counters.visible > 1000 && counters.visible < counters.stored / 2, "the test wants some that are seen");
 
@@ -216,7 +216,7 @@ fn light_does_not_jump_when_the_boxes_move() {
     let mut device = open();
     let (setup, stages, design, medium, place) = sky(&mut device);
     let mut at = |x: f64| {
-        let place = Place { centre: [x - setup.origin[0], place.centre[1], place.centre[2]], ..place };
+        let place = VolumePlace { centre: [x - setup.origin[0], place.centre[1], place.centre[2]], ..place };
         light(&mut device, design, &place, &medium, &stages.set, stages.lighting.sun_depths())
     };
     // They move where the camera is half way between two even voxels.
@@ -265,8 +265,13 @@ fn a_deck_lets_through_what_diffusion_does() {
         let depths = Buffer::upload(&gpu, "depths", &vec![[0.0f32; 4]; particles.len()]).unwrap();
         let design = VolumeDesign { dim: 32, layers: 27, levels: 1, edge: 1000.0, height: 42.0, fitted: false };
         let to_sun = [0.0, 1.0, 0.0];
-        let place =
-            Place { centre: [0.0; 3], origin: [0.0; 3], base: 1000.0 - 20.0, planet_radius: f64::INFINITY, to_sun };
+        let place = VolumePlace {
+            centre: [0.0; 3],
+            origin: [0.0; 3],
+            base: 1000.0 - 20.0,
+            planet_radius: f64::INFINITY,
+            to_sun,
+        };
         // No shade: the slab is lit evenly throughout, q = σ. Then φ'' = -3 s q is a parabola between its Marshak ends.
         let Light { params, matter, light, .. } = light(&mut device, design, &place, &medium, &set, &depths);
         let volume = Volume(&params);
@@ -329,7 +334,7 @@ fn voxels_stay_where_they_are_while_the_camera_moves() {
     let design = VolumeDesign::of_layer(150.0, 96, 4.0e4, 900.0);
     let medium = VolumeMedium::new(&Clouds::default(), 0.8);
     let at = |x: f64, origin: f64| {
-        let place = Place {
+        let place = VolumePlace {
             centre: [x - origin, 500.0, 3.0],
             origin: [origin, 0.0, 0.0],
             base: 1000.0,

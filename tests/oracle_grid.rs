@@ -77,7 +77,7 @@ fn output_is_bit_equal_run_to_run() {
     let mut runs = (0..5).map(|_| {
         let counters = stages.run(&mut device, &setup);
         let particles: Vec<u8> = read(&mut device, stages.set.particles(), counters.stored * 64);
-        let lights: Vec<u8> = read(&mut device, stages.set.lights(), counters.stored * 16);
+        let lights: Vec<u8> = read(&mut device, stages.lighting.lights(), counters.stored * 16);
         let order: Vec<u32> = read(&mut device, stages.compact.order(), counters.visible);
         (counters, particles, lights, order)
     });

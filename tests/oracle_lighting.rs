@@ -7,7 +7,7 @@ use clouds::{Setup, Stages, VOXEL, open, read, silent};
 use glam::{DQuat, DVec3, EulerRot};
 use welkin::gpu::Feature;
 use welkin::grid::{ParticleList, ParticleSet};
-use welkin::lighting::Lighting;
+use welkin::lighting::tables::Occlusion;
 use welkin::params::{Clouds, Coverage, ParticleDesc, Transfer};
 use welkin::reference::grid;
 use welkin::reference::lighting::{SunShares, chord_ahead, reach, smooth, sun_optical_depth, sun_shares};
@@ -103,7 +103,7 @@ fn long_thin_occluders_far_away_are_as_exact_as_near_ones() {
     let gpu = device.gpu().clone();
     let mut list = ParticleList::new(&gpu, &particles, 2).unwrap();
     let set = ParticleSet::new(&gpu, list.count()).unwrap();
-    let lighting = Lighting::new(&gpu, set.capacity()).unwrap();
+    let lighting = Occlusion::new(&gpu, set.capacity()).unwrap();
     let slab = Slab {
         centre: [0.0; 3],
         base: 0.0,
@@ -154,7 +154,7 @@ fn smoothing_and_skylight_are_those_of_the_reference() {
     let counters = stages.run(&mut device, &setup);
     let sun_light: Vec<ParticleLight> = read(&mut device, stages.lighting.sun_light(), counters.stored);
     let [pole, _, far] = [0, 1, 2].map(|i| sun_light.iter().map(|t| f64::from(t.diffuse[i])).collect::<Vec<_>>());
-    let lights: Vec<ParticleLight> = read(&mut device, stages.set.lights(), counters.stored);
+    let lights: Vec<ParticleLight> = read(&mut device, stages.lighting.lights(), counters.stored);
     let params = setup.grid_params();
     let grid = grid::generate(&params, &[]);
     for (index, light) in lights.iter().enumerate() {

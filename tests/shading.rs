@@ -11,9 +11,9 @@ use welkin::blend::{BlendInputs, Blender, CloudTargets, NO_CLOUD, Shading};
 use welkin::detail::DetailTile;
 use welkin::film::Film;
 use welkin::gpu::standalone::{Options, Standalone};
-use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc};
+use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc, MethodBindings, Resource, Sampler};
 use welkin::grid::Counters;
-use welkin::lighting::volume::{LightVolume, VolumeDesign};
+use welkin::lighting::tables::volume::{LightVolume, VolumeDesign};
 use welkin::lut::{Detail, TableParams, Tables};
 use welkin::params::{Aim, Blend, Camera, Clouds, Lighting, Precision, Style};
 use welkin::reference::phase::PhaseFunction;
@@ -164,18 +164,21 @@ fn render(
     let pixels = (SIZE * SIZE) as usize;
     let bytes = Buffer::new(&gpu, "scene bytes", 16 * pixels as u64, BufferKind::Readback).unwrap();
     let volume = LightVolume::new(&gpu, VolumeDesign::none(), 1).unwrap();
+    let light = [
+        ("lights", Resource::Buffer(&lights)),
+        ("sky_light", Resource::Buffer(&sky_light)),
+        ("scattering_lut", Resource::Sampled(tables.scattering.image().sampled(Sampler::LinearClamp))),
+        ("volume", Resource::Buffer(volume.params(0))),
+        ("light_volume", Resource::Sampled(volume.image().sampled(Sampler::LinearClamp))),
+    ];
     let inputs = BlendInputs {
         frame: &frame,
         particles: &particles,
         order: &order,
-        lights: &lights,
         medium: &medium,
-        sky_light: &sky_light,
         optical_depth_lut: tables.optical_depth.image(),
-        scattering_lut: tables.scattering.image(),
         detail_tile: &detail.image,
-        volume: volume.params(0),
-        light_volume: volume.image(),
+        lighting: MethodBindings { method: Lighting::Tables.name(), resources: &light },
         opaque_distance: &depth,
         draw_args: &args,
         draw_args_offset: 0,

@@ -1,9 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // vertex: blend/particle.vert
+// lighting: each
 // Mode `alpha`: sorted alpha blending by fixed function, the fallback that runs anywhere. Overlap is ignored: each
 // particle lies wholly in front of those drawn before it.
-#include "blend/shade.glsl"
 #include "blend/bindings.glsl"
 #include "blend/segment.glsl"
 layout(location = 0) flat in uint particle_index;

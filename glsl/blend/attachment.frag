@@ -1,10 +1,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // vertex: blend/particle.vert
+// lighting: each
 // Mode `attachment`: the merge of `interlock`, with the pixel's state in colour attachments that a fragment reads back as
 // input attachments. VK_EXT_rasterization_order_attachment_access orders the fragments of one pixel as they were drawn; that
 // is part of the pipeline, not of the shader.
-#include "blend/shade.glsl"
 #include "blend/bindings.glsl"
 layout(input_attachment_index = 0, binding = 9) uniform subpassInput state_0;    // radiance, Σ optical depth
 layout(input_attachment_index = 1, binding = 10) uniform subpassInput state_1;   // colour, optical depth

@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // vertex: blend/particle.vert
+// lighting: each
 // Mode `attachment:4`: the window of `interlock:4` in seven colour attachments of 16 bytes; see attachment.frag.
-#include "blend/shade.glsl"
 #include "blend/bindings.glsl"
 layout(input_attachment_index = 0, binding = 9) uniform subpassInput state_0;    // radiance, Σ optical depth
 layout(input_attachment_index = 1, binding = 10) uniform subpassInput state_1;   // colour, optical depth

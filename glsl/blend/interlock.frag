@@ -2,10 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_ARB_fragment_shader_interlock : require
 // vertex: blend/particle.vert
+// lighting: each
 // Mode `interlock`: the pixel's pending segment lives in storage images; VK_EXT_fragment_shader_interlock makes the
 // read-modify-write of one pixel atomic, and orders it as the particles were drawn, back to front.
 // Cost: 40 bytes read and up to 40 written a fragment; everything computable is computed before the critical section.
-#include "blend/shade.glsl"
 #include "blend/bindings.glsl"
 layout(pixel_interlock_ordered) in;
 // `coherent`: the interlock orders accesses, it does not make them visible.

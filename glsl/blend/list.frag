@@ -1,9 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // vertex: blend/particle.vert
+// lighting: each
 // Mode `list`: every segment goes into the list of its pixel, in whatever order fragments run; list_resolve.comp sorts and
 // integrates. Needs no ordering at all. Cost: two atomics and 32 bytes written a fragment.
-#include "blend/shade.glsl"
 #include "blend/list.glsl"
 #include "blend/bindings.glsl"
 layout(binding = 9, std430) restrict buffer ListHeads { uint node[]; } list_heads;

@@ -1,7 +1,7 @@
-// The segment that a particle cuts out of the view ray of a pixel. Included after the bindings that it reads.
-#include "volume/lookup.glsl"
-#include "volume/seen.glsl"
-layout(constant_id = 0) const uint LIGHTING = LIGHTING_TABLES;
+// The segment that a particle cuts out of the view ray of a pixel: exact optical depth and detail noise from here, its colour
+// from the lighting method. Included after blend/bindings.glsl.
+#include "lighting/hit.glsl"
+#include "lighting/source.glsl"   // the build puts each method's own in its place
 layout(constant_id = 1) const uint HOMOGENEOUS = 0;   // 1: density 1 everywhere inside, no table and no detail
 
 // Radius of the ball on which rays look their detail up. A smaller one draws truer silhouettes (relative RMSE of a heap's
@@ -53,33 +53,25 @@ Segment particle_segment(uint index, vec2 pixel) {
     s.optical_depth = sigma * length_inside;
     if (s.optical_depth <= 0.0) return NO_SEGMENT;
 
-    if (LIGHTING == LIGHTING_FLAT) {
-        s.colour = p.colour;
-    } else {
-        // The noise's slope turns the surface that light meets, but never away from the eye.
-        vec3 normal_us = entry_us;
-        float shift = length(normal_shift);
-        if (shift > 0.0) {
-            normal_us += rotate_inverse(p.rotation, normal_shift / (1.0 + shift));
-            normal_us = normalize(normal_us - max(dot(normal_us, ray.dir_us) + 0.05, 0.0) * ray.dir_us);
-        }
-        vec3 normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
-        float tau_chord = sigma * (t_exit - t_enter);
-        ParticleLight light = lights.elements[index];
-        float others = 0.0;   // what others have scattered
-        if (light.crowd > 0.0) {
-            float seen = s.t_enter + seen_depth(sigma);
-            if (volume.params.fitted == 1u) {
-                // The fit holds near its middle (volume/seen.comp).
-                float middle = ray.t_closest - ray.metres + seen_depth(f.sigma_t * p.density * p.fade * f.fill);
-                seen = clamp(seen, middle - 0.25 * ray.metres, middle + 0.25 * ray.metres);
-                others = max(dot(light.others.xyz, f.camera + seen * dir) + light.others.w, 0.0);
-            } else {
-                others = light.crowd * volume_radiance(light_volume, f.camera + seen * dir);
-            }
-        }
-        s.colour = shade_tables(medium.params, sky_light.params, light, scattering_lut, f, p, ray, normal_us,
-                                dir, normal_ws, tau_chord, matter.y + depth, others);
+    // The noise's slope turns the surface that light meets, but never away from the eye.
+    vec3 normal_us = entry_us;
+    float shift = length(normal_shift);
+    if (shift > 0.0) {
+        normal_us += rotate_inverse(p.rotation, normal_shift / (1.0 + shift));
+        normal_us = normalize(normal_us - max(dot(normal_us, ray.dir_us) + 0.05, 0.0) * ray.dir_us);
     }
+    Hit hit;
+    hit.index = index;
+    hit.particle = p;
+    hit.ray = ray;
+    hit.dir = dir;
+    hit.normal_us = normal_us;
+    hit.normal_ws = normalize(rotate(p.rotation, normal_us / p.semi_axes));
+    hit.extinction = sigma;
+    hit.t_enter = s.t_enter;
+    hit.t_exit = s.t_exit;
+    hit.chord_depth = sigma * (t_exit - t_enter);
+    hit.first_matter = matter.y + depth;
+    s.colour = source_radiance(hit);
     return s;
 }

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+// lighting: each
 // Mode `tiled`: the exact integral along each pixel's ray, front to back, over the particles of its tile. One group a
 // tile that has any, one thread a pixel; threads share nothing, so neither barriers nor a subgroup size matter.
 //
@@ -8,7 +9,6 @@
 // wait in a window; when it is full, all events up to that bound are integrated, which empties the places of segments
 // that end there. A pixel whose window stays full is left to tiled_rest.comp. A particle that begins behind HIDDEN
 // optical depths is never shaded, and a pixel ends when all later ones do.
-#include "blend/shade.glsl"
 #include "blend/tile_particle.glsl"
 #include "blend/tiled_use.glsl"
 #include "blend/bindings.glsl"

@@ -1,9 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+// lighting: each
 // Mode `tiled`: the pixels whose window overflowed, by the sweep that needs no window. One group for each half tile that
 // has such pixels. Cost: segments are evaluated again for every batch of events.
-#include "blend/shade.glsl"
 #include "blend/tile_particle.glsl"
 #include "blend/tiled_use.glsl"
 #include "blend/bindings.glsl"

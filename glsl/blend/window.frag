@@ -2,10 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_ARB_fragment_shader_interlock : require
 // vertex: blend/particle.vert
+// lighting: each
 // Mode `interlock:K` with K = WINDOW > 1 pending segments a pixel, in the layers of one storage image: what is committed, then
 // colour and optical depth of each segment, then the ends of two segments a layer.
 // Cost: 16 + 24 K bytes read and written a fragment inside the critical section, and `insert` between.
-#include "blend/shade.glsl"
 #include "blend/bindings.glsl"
 layout(pixel_interlock_ordered) in;
 layout(constant_id = 2) const uint WINDOW = 2;

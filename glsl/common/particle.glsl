@@ -19,7 +19,7 @@ struct ParticleLight {
     vec3  direct;     // of what comes straight from the sun [0, 1]
     float crowd;      // how much it sees of what its neighbours scatter: 0 alone, 1 in the depth of a crowd
     vec4  others;     // what it sees of it as the eye looks through it, per irradiance of the sun: gradient [1/(m sr)], value at
-                      // the floating origin [1/sr]; of visible particles, and where the volume is fitted (volume/params.glsl)
+                      // the floating origin [1/sr]; of visible particles, and where the volume is fitted (lighting/tables/diffusion/params.glsl)
 };
 
 // Rotates v by the unit quaternion q.

@@ -1,7 +1,7 @@
 // Optical depth of cloud between a point and the sun, by walking the list of the point's light tile.
 //
 // The includer declares, under these names, readonly buffers: `params.tiling` (TilingParams), `occluders.by[]`,
-// `tile_heads.head[]`, `tile_nodes.node[]`. See lighting/sun.comp.
+// `tile_heads.head[]`, `tile_nodes.node[]`. See lighting/tables/sun.comp.
 //
 // Each occluder counts with its own extinction, density and fade. (Yusov's released code scales it by the receiver's
 // density; src/reference/lighting.rs tests that we do not.)

@@ -2,7 +2,6 @@
 
 use super::{Atmosphere, CloudShadow};
 use crate::Result;
-use crate::blend::{CloudTargets, NO_CLOUD, cloud_format};
 use crate::gpu::{Buffer, ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
 use crate::params::{Precision, SkyModel};
 use crate::shaders::{
@@ -12,6 +11,7 @@ use crate::shaders::{
     atmosphere_shafts_smooth_comp as shafts_smooth,
 };
 use crate::shared::assert_layout;
+use crate::targets::{CloudTargets, NO_CLOUD, cloud_format};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;

@@ -1,30 +1,33 @@
 //! Mode `alpha`: sorted alpha blending by fixed function (`glsl/blend/alpha.frag`). Runs on every device.
 
-use super::{BlendInputs, CloudTargets, NEAREST_FORMAT, NO_CLOUD, Shading, cloud_format};
+use super::{BlendInputs, CloudTargets, Compositor, Kind, NO_CLOUD, Setting, anywhere};
 use crate::Result;
-use crate::gpu::{Attachment, BlendState, Draw, Gpu, GraphicsPipeline, GraphicsState, Recorder, Target};
-use crate::params::Precision;
+use crate::gpu::{Attachment, BlendState, Draw, GraphicsPipeline, GraphicsState, Recorder, Target};
 use crate::shaders::blend_alpha_frag as shader;
-use std::sync::Arc;
+use crate::targets::{NEAREST_FORMAT, cloud_format};
 
-pub(super) struct Alpha {
+pub(super) const KIND: Kind = Kind { supports: anywhere, open: |setting, _| Ok(Box::new(Alpha::new(setting)?)) };
+
+struct Alpha {
     pipeline: GraphicsPipeline,
 }
 
 impl Alpha {
-    pub(super) fn new(gpu: &Arc<Gpu>, shading: Shading, precision: Precision) -> Result<Self> {
+    fn new(setting: &Setting<'_>) -> Result<Self> {
         let state = GraphicsState {
             attachments: vec![
-                Attachment { format: cloud_format(precision), blend: BlendState::OverTransmittance },
+                Attachment { format: cloud_format(setting.precision), blend: BlendState::OverTransmittance },
                 Attachment { format: NEAREST_FORMAT, blend: BlendState::Min },
             ],
             ..GraphicsState::default()
         };
-        let pipeline = GraphicsPipeline::new(gpu, &shader::PROGRAM, &shading.specialization(), state)?;
-        Ok(Self { pipeline })
+        let (program, constants) = (shader::program(setting.shading.lighting.name()), setting.shading.specialization());
+        Ok(Self { pipeline: GraphicsPipeline::new(setting.gpu, program, &constants, state)? })
     }
+}
 
-    pub(super) fn record(
+impl Compositor for Alpha {
+    fn record(
         &self,
         rec: &mut Recorder<'_>,
         inputs: &BlendInputs<'_>,

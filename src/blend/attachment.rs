@@ -1,20 +1,21 @@
 //! Mode `attachment`: the merges of `interlock` in colour attachments that fragments read back, ordered by
 //! `VK_EXT_rasterization_order_attachment_access` (`glsl/blend/attachment*.frag`).
 
-use super::{BlendInputs, CloudTargets, Shading};
+use super::{BlendInputs, CloudTargets, Compositor, Kind, Setting};
 use crate::Result;
 use crate::gpu::{
-    Attachment, BlendState, Capabilities, ComputePipeline, Draw, Feature, Feedback, FeedbackPath, Gpu,
-    GraphicsPipeline, GraphicsState, Image, ImageDesc, Recorder, Sampler, Target,
+    Attachment, BlendState, Capabilities, ComputePipeline, Draw, Feature, Feedback, FeedbackPath, GraphicsPipeline,
+    GraphicsState, Image, ImageDesc, Recorder, Sampler, Target,
 };
 use crate::shaders::{
     blend_attachment_frag as one, blend_attachment_resolve_comp as resolve, blend_attachment2_frag as two,
     blend_attachment4_frag as four,
 };
 use ash::vk;
-use std::sync::Arc;
 
-pub(super) struct AttachmentMode {
+pub(super) const KIND: Kind = Kind { supports, open: |setting, k| Ok(Box::new(AttachmentMode::new(setting, k)?)) };
+
+struct AttachmentMode {
     pipeline: GraphicsPipeline,
     resolve: ComputePipeline,
     state: Vec<Image>,
@@ -27,7 +28,7 @@ fn attachment_count(k: u32) -> u32 {
 }
 
 /// Whether a device can keep a window of `k` segments in attachments, or a sentence why not.
-pub(super) fn supports(k: u32, capabilities: &Capabilities) -> Result<(), String> {
+fn supports(k: u32, capabilities: &Capabilities) -> Result<(), String> {
     capabilities.supports(Feature::RasterizationOrderAttachmentAccess).map_err(str::to_owned)?;
     let (needed, most) = (attachment_count(k), capabilities.max_feedback_attachments);
     if k > 4 {
@@ -51,7 +52,9 @@ fn path(capabilities: &Capabilities) -> FeedbackPath {
 }
 
 impl AttachmentMode {
-    pub(super) fn new(gpu: &Arc<Gpu>, k: u32, shading: Shading, extent: [u32; 2]) -> Result<Self> {
+    fn new(setting: &Setting<'_>, k: u32) -> Result<Self> {
+        let Setting { gpu, shading, extent, .. } = *setting;
+        let lighting = shading.lighting.name();
         let count = attachment_count(k) as usize;
         let mut formats = vec![vk::Format::R32G32B32A32_SFLOAT; count];
         if k == 1 {
@@ -70,9 +73,9 @@ impl AttachmentMode {
             ..GraphicsState::default()
         };
         let program = match k {
-            1 => &one::PROGRAM,
-            2 => &two::PROGRAM,
-            _ => &four::PROGRAM,
+            1 => one::program(lighting),
+            2 => two::program(lighting),
+            _ => four::program(lighting),
         };
         Ok(Self {
             pipeline: GraphicsPipeline::new(gpu, program, &shading.specialization(), state)?,
@@ -80,8 +83,10 @@ impl AttachmentMode {
             state: formats.iter().enumerate().map(image).collect::<Result<_>>()?,
         })
     }
+}
 
-    pub(super) fn record(
+impl Compositor for AttachmentMode {
+    fn record(
         &self,
         rec: &mut Recorder<'_>,
         inputs: &BlendInputs<'_>,

@@ -1,15 +1,22 @@
 //! Mode `interlock`: the volume-aware merge, ordered per pixel by `VK_EXT_fragment_shader_interlock`: with one pending
 //! segment `glsl/blend/interlock.frag` (Yusov 5.5), with more `glsl/blend/window.frag`.
 
-use super::{BlendInputs, CloudTargets, Shading};
+use super::{BlendInputs, CloudTargets, Compositor, Kind, Setting};
 use crate::Result;
-use crate::gpu::{ComputePipeline, Draw, Gpu, GraphicsPipeline, GraphicsState, Image, ImageDesc, Recorder};
+use crate::gpu::{
+    Capabilities, ComputePipeline, Draw, Feature, GraphicsPipeline, GraphicsState, Image, ImageDesc, Recorder,
+};
 use crate::shaders::{blend_interlock_frag as single, blend_resolve_comp as single_resolve};
 use crate::shaders::{blend_window_frag as window, blend_window_resolve_comp as window_resolve};
 use ash::vk;
-use std::sync::Arc;
 
-pub(super) struct Interlock {
+pub(super) const KIND: Kind = Kind { supports, open: |setting, k| Ok(Box::new(Interlock::new(setting, k)?)) };
+
+fn supports(_: u32, capabilities: &Capabilities) -> Result<(), String> {
+    capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned)
+}
+
+struct Interlock {
     pipeline: GraphicsPipeline,
     resolve: ComputePipeline,
     state: State,
@@ -23,7 +30,9 @@ enum State {
 }
 
 impl Interlock {
-    pub(super) fn new(gpu: &Arc<Gpu>, k: u32, shading: Shading, extent: [u32; 2]) -> Result<Self> {
+    fn new(setting: &Setting<'_>, k: u32) -> Result<Self> {
+        let Setting { gpu, shading, extent, .. } = *setting;
+        let lighting = shading.lighting.name();
         let usage = vk::ImageUsageFlags::STORAGE;
         let desc = |name, format| ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage };
         let (wide, narrow) = (vk::Format::R32G32B32A32_SFLOAT, vk::Format::R32G32_SFLOAT);
@@ -33,11 +42,11 @@ impl Interlock {
                 pending: Image::new(gpu, &desc("interlocked pending", wide))?,
                 ends: Image::new(gpu, &desc("interlocked extent", narrow))?,
             };
-            (&single::PROGRAM, &single_resolve::PROGRAM, vec![], state)
+            (single::program(lighting), &single_resolve::PROGRAM, vec![], state)
         } else {
             let layers = 1 + k + k / 2;
             let state = State::Window(Image::layered(gpu, &desc("interlocked window", wide), layers)?);
-            (&window::PROGRAM, &window_resolve::PROGRAM, vec![("WINDOW", k)], state)
+            (window::program(lighting), &window_resolve::PROGRAM, vec![("WINDOW", k)], state)
         };
         let specialization = [&shading.specialization()[..], &constants].concat();
         Ok(Self {
@@ -46,8 +55,10 @@ impl Interlock {
             state,
         })
     }
+}
 
-    pub(super) fn record(
+impl Compositor for Interlock {
+    fn record(
         &self,
         rec: &mut Recorder<'_>,
         inputs: &BlendInputs<'_>,

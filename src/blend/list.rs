@@ -4,10 +4,10 @@
 //! The append buffer counts past its capacity and grows between frames ([`List::grow`]). Where it may not grow any more,
 //! the picture is drawn in bands of rows that take turns with it: however many segments a frame has, none is lost.
 
-use super::{BlendInputs, CloudTargets, NodeBudget, Shading};
+use super::{BlendInputs, CloudTargets, Compositor, Kind, Setting, anywhere};
 use crate::gpu::{Buffer, ComputePipeline, Draw, DrawCall, Gpu, GraphicsPipeline, GraphicsState, PassState, Recorder};
-use crate::grid::{Counters, grown};
-use crate::renderer::ListUse;
+use crate::grid::Counters;
+use crate::lists::{ListUse, grown};
 use crate::shaders::{blend_list_frag as shader, blend_list_resolve_comp as resolve};
 use crate::shared::assert_layout;
 use crate::{Error, Result};
@@ -37,7 +37,9 @@ const NODES_PER_PIXEL: u32 = 8;
 /// The append buffer takes no more than this [bytes], and no more than a shader can address.
 const MOST_BYTES: u64 = 512 << 20;
 
-pub(super) struct List {
+pub(super) const KIND: Kind = Kind { supports: anywhere, open: |setting, _| Ok(Box::new(List::new(setting)?)) };
+
+struct List {
     pipeline: GraphicsPipeline,
     resolve: ComputePipeline,
     heads: Buffer,
@@ -50,16 +52,16 @@ pub(super) struct List {
 }
 
 impl List {
-    /// Lists for `extent` pixels.
-    pub(super) fn new(gpu: &Arc<Gpu>, shading: Shading, extent: [u32; 2], budget: NodeBudget) -> Result<Self> {
+    fn new(setting: &Setting<'_>) -> Result<Self> {
+        let Setting { gpu, shading, extent, budget, .. } = *setting;
         let bytes = MOST_BYTES.min(u64::from(gpu.capabilities().max_storage_buffer_range));
         let most = (bytes / size_of::<SegmentNode>() as u64) as u32;
         let most = budget.most.map_or(most, |wish| wish.clamp(1, most));
         let pixels = extent[0] * extent[1];
         let capacity = budget.first.unwrap_or(pixels.saturating_mul(NODES_PER_PIXEL)).clamp(1, most);
-        let state = GraphicsState::default();
+        let (state, lighting) = (GraphicsState::default(), shading.lighting.name());
         Ok(Self {
-            pipeline: GraphicsPipeline::new(gpu, &shader::PROGRAM, &shading.specialization(), state)?,
+            pipeline: GraphicsPipeline::new(gpu, shader::program(lighting), &shading.specialization(), state)?,
             resolve: ComputePipeline::new(gpu, &resolve::PROGRAM, &[])?,
             heads: Buffer::array::<u32>(gpu, "segment heads", pixels as usize)?,
             nodes: Buffer::array::<SegmentNode>(gpu, "segment nodes", capacity as usize)?,
@@ -71,12 +73,35 @@ impl List {
         })
     }
 
-    pub(super) fn lists(&self, counters: &Counters) -> Vec<ListUse> {
+    fn record_segments(
+        &self,
+        rec: &mut Recorder<'_>,
+        inputs: &BlendInputs<'_>,
+        extent: [u32; 2],
+        rows: Range<u32>,
+    ) -> Result<()> {
+        rec.fill_buffer(&self.wanted, 0, self.wanted.size(), 0);
+        let bindings = scene_bindings!(shader, inputs, {
+            list_heads: &self.heads,
+            list_nodes: &self.nodes,
+            list_use: &self.wanted,
+        });
+        let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
+        let push = bytemuck::bytes_of(&self.capacity);
+        let pass = PassState { rows: Some((rows.start, rows.end)), ..PassState::default() };
+        let call = DrawCall { pipeline: &self.pipeline, bindings: &bindings, push, draw };
+        rec.draw_pass(extent, &[], pass, &[call])
+    }
+}
+
+impl Compositor for List {
+    fn lists(&self, counters: &Counters) -> Vec<ListUse> {
         vec![ListUse { name: "blend_nodes", needed: counters.blend_nodes, capacity: self.capacity }]
     }
 
-    /// Makes room for `needed` nodes, by a longer buffer or by more bands that share it. True if that was called for.
-    pub(super) fn grow(&mut self, gpu: &Arc<Gpu>, needed: u32) -> Result<bool> {
+    /// A longer buffer, or more bands that share it.
+    fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters) -> Result<bool> {
+        let needed = counters.blend_nodes;
         if needed <= self.capacity {
             return Ok(false);
         }
@@ -101,7 +126,7 @@ impl List {
         Ok(true)
     }
 
-    pub(super) fn record(
+    fn record(
         &self,
         rec: &mut Recorder<'_>,
         inputs: &BlendInputs<'_>,
@@ -127,25 +152,5 @@ impl List {
             })?;
         }
         Ok(())
-    }
-
-    fn record_segments(
-        &self,
-        rec: &mut Recorder<'_>,
-        inputs: &BlendInputs<'_>,
-        extent: [u32; 2],
-        rows: Range<u32>,
-    ) -> Result<()> {
-        rec.fill_buffer(&self.wanted, 0, self.wanted.size(), 0);
-        let bindings = scene_bindings!(shader, inputs, {
-            list_heads: &self.heads,
-            list_nodes: &self.nodes,
-            list_use: &self.wanted,
-        });
-        let draw = Draw::Indirect { args: inputs.draw_args, offset: inputs.draw_args_offset };
-        let push = bytemuck::bytes_of(&self.capacity);
-        let pass = PassState { rows: Some((rows.start, rows.end)), ..PassState::default() };
-        let call = DrawCall { pipeline: &self.pipeline, bindings: &bindings, push, draw };
-        rec.draw_pass(extent, &[], pass, &[call])
     }
 }

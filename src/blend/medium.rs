@@ -1,4 +1,4 @@
-//! What the clouds are made of, as the shading reads it (`glsl/blend/shade.glsl`).
+//! What the clouds are made of, as the shading reads it (`glsl/medium/params.glsl`).
 
 use crate::params::{Clouds, Phase};
 use crate::shared::assert_layout;

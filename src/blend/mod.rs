@@ -18,15 +18,11 @@ macro_rules! scene_bindings {
             frame: $inputs.frame,
             particles: $inputs.particles,
             order: $inputs.order,
-            lights: $inputs.lights,
             medium: $inputs.medium,
-            sky_light: $inputs.sky_light,
             optical_depth_lut: $inputs.optical_depth_lut.sampled($crate::blend::OPTICAL_DEPTH_SAMPLER),
-            scattering_lut: $inputs.scattering_lut.sampled($crate::gpu::Sampler::LinearClamp),
             detail_tile: $inputs.detail_tile.sampled($crate::gpu::Sampler::LinearRepeat),
             opaque_distance: $inputs.opaque_distance.sampled($crate::gpu::Sampler::NearestClamp),
-            volume: $inputs.volume,
-            light_volume: $inputs.light_volume.sampled($crate::gpu::Sampler::LinearClamp),
+            lighting: $inputs.lighting,
             $($name: $resource,)*
         }
     };
@@ -39,43 +35,14 @@ mod list;
 pub mod medium;
 mod tiled;
 
-use crate::gpu::{Buffer, Capabilities, Feature, Gpu, Image, ImageDesc, Recorder, Sampler};
+use crate::gpu::{Buffer, Capabilities, Gpu, Image, MethodBindings, Recorder, Sampler};
 use crate::grid::Counters;
+use crate::lists::ListUse;
 use crate::params::{Blend, Lighting, Precision, WINDOWS};
-use crate::renderer::ListUse;
 use crate::{Error, Result};
-use ash::vk;
 use std::sync::Arc;
 
-/// The images that every mode writes.
-pub struct CloudTargets {
-    /// In-scattered radiance in rgb [W m⁻² sr⁻¹], transmittance in a.
-    pub cloud: Image,
-    /// Distance to the first cloud along the ray [m]; 1e30 where there is none.
-    pub nearest: Image,
-}
-
-impl CloudTargets {
-    /// Targets of `extent` pixels.
-    pub fn new(gpu: &Arc<Gpu>, extent: [u32; 2], precision: Precision) -> Result<Self> {
-        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::COLOR_ATTACHMENT;
-        let image =
-            |name, format| Image::new(gpu, &ImageDesc { name, extent: [extent[0], extent[1], 0], format, usage });
-        Ok(Self { cloud: image("cloud", cloud_format(precision))?, nearest: image("nearest", NEAREST_FORMAT)? })
-    }
-}
-
-const NEAREST_FORMAT: vk::Format = vk::Format::R32_SFLOAT;
-
-pub(crate) fn cloud_format(precision: Precision) -> vk::Format {
-    match precision {
-        Precision::F16 => vk::Format::R16G16B16A16_SFLOAT,
-        Precision::F32 => vk::Format::R32G32B32A32_SFLOAT,
-    }
-}
-
-/// Value of `nearest` where there is no cloud [m].
-pub const NO_CLOUD: f32 = 1e30;
+pub use crate::targets::{CloudTargets, NO_CLOUD};
 
 /// What the particles are drawn from.
 #[derive(Clone, Copy)]
@@ -86,22 +53,14 @@ pub struct BlendInputs<'a> {
     pub particles: &'a Buffer,
     /// Indices of the visible particles, back to front.
     pub order: &'a Buffer,
-    /// [`ParticleLight`](crate::shared::ParticleLight)s.
-    pub lights: &'a Buffer,
     /// [`MediumParams`](medium::MediumParams).
     pub medium: &'a Buffer,
-    /// [`SkyLight`](crate::atmosphere::SkyLight).
-    pub sky_light: &'a Buffer,
     /// Optical depth table.
     pub optical_depth_lut: &'a Image,
-    /// Scattering table.
-    pub scattering_lut: &'a Image,
     /// Tile of billow noise.
     pub detail_tile: &'a Image,
-    /// [`VolumeParams`](crate::lighting::volume::VolumeParams).
-    pub volume: &'a Buffer,
-    /// What the clouds scatter ([`LightVolume::image`](crate::lighting::volume::LightVolume::image)).
-    pub light_volume: &'a Image,
+    /// What the source function of the lighting method reads; the method is that of [`Shading`].
+    pub lighting: MethodBindings<'a>,
     /// Distance to the opaque scene at the resolution of the targets [m].
     pub opaque_distance: &'a Image,
     /// `VkDrawIndirectCommand`: 4 vertices, one instance for each visible particle.
@@ -126,20 +85,27 @@ pub struct Choice {
 /// What `auto` tries, the best first: quality, then cost (`docs/blending.md` has both).
 pub const AUTO: &[Blend] = &[Blend::Interlock(1), Blend::Attachment(1), Blend::Alpha];
 
-/// Picks the mode, once. `Auto` takes the first of [`AUTO`] that the device supports.
+/// What `exact` tries, the cheapest first: a thread a pixel that shades what is seen against lists of all segments.
+pub const EXACT: &[Blend] = &[Blend::Tiled, Blend::List];
+
+/// Picks the mode, once. `Auto` takes the first of [`AUTO`] that the device supports, `Exact` the first of [`EXACT`].
 ///
 /// # Errors
 /// [`Error::Unsupported`], with the reason, if a mode is asked for by name that the device cannot do.
 pub fn choose(requested: Blend, capabilities: &Capabilities) -> Result<Choice> {
-    if requested != Blend::Auto {
-        supports(requested, capabilities).map_err(|reason| Error::Unsupported {
-            needed: format!("blend mode {requested} ({reason})"),
-            by: capabilities.device_name.clone(),
-        })?;
-        return Ok(Choice { requested, used: requested, reason: "as requested".to_owned() });
-    }
+    let candidates = match requested {
+        Blend::Auto => AUTO,
+        Blend::Exact => EXACT,
+        _ => {
+            supports(requested, capabilities).map_err(|reason| Error::Unsupported {
+                needed: format!("blend mode {requested} ({reason})"),
+                by: capabilities.device_name.clone(),
+            })?;
+            return Ok(Choice { requested, used: requested, reason: "as requested".to_owned() });
+        }
+    };
     let mut lacking = Vec::new();
-    for &used in AUTO {
+    for &used in candidates {
         match supports(used, capabilities) {
             Ok(()) if lacking.is_empty() => {
                 return Ok(Choice { requested, used, reason: format!("the device has all that {used} needs") });
@@ -151,26 +117,70 @@ pub fn choose(requested: Blend, capabilities: &Capabilities) -> Result<Choice> {
     Err(Error::Unsupported { needed: lacking.join("; "), by: capabilities.device_name.clone() })
 }
 
-/// Whether a device can run `mode`, or a sentence why not.
-pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> {
-    match mode {
-        Blend::Auto | Blend::Alpha | Blend::List | Blend::Tiled => Ok(()),
-        Blend::Interlock(k) | Blend::Attachment(k) if !WINDOWS.contains(&k) => {
-            Err(format!("a window has one of {WINDOWS:?} segments, not {k}"))
-        }
-        Blend::Interlock(_) => capabilities.supports(Feature::FragmentShaderInterlock).map_err(str::to_owned),
-        Blend::Attachment(k) => attachment::supports(k, capabilities),
-        other => Err(format!("{other} is not in this version yet")),
+/// A way of compositing.
+trait Compositor {
+    /// Draws all visible particles into `targets`, which have `extent` pixels.
+    fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        inputs: &BlendInputs<'_>,
+        targets: &CloudTargets,
+        extent: [u32; 2],
+    ) -> Result<()>;
+
+    /// Its lists, and what a frame with these counts wanted of them.
+    fn lists(&self, _: &Counters) -> Vec<ListUse> {
+        Vec::new()
+    }
+
+    /// Makes room for what such a frame wanted. True if there was too little.
+    fn grow(&mut self, _: &Arc<Gpu>, _: &Counters) -> Result<bool> {
+        Ok(false)
     }
 }
 
-#[allow(clippy::large_enum_variant)] // A renderer has one.
-enum Mode {
-    Interlock(interlock::Interlock),
-    Attachment(attachment::AttachmentMode),
-    List(list::List),
-    Tiled(tiled::Tiled),
-    Alpha(alpha::Alpha),
+/// What a compositor is made for.
+struct Setting<'a> {
+    gpu: &'a Arc<Gpu>,
+    shading: Shading,
+    extent: [u32; 2],
+    precision: Precision,
+    budget: NodeBudget,
+}
+
+/// How a kind of compositor comes to be.
+struct Kind {
+    /// Whether a device can run it with a window of so many segments, or a sentence why not.
+    supports: fn(u32, &Capabilities) -> Result<(), String>,
+    /// Pipelines and state, with a window of so many segments.
+    open: fn(&Setting<'_>, u32) -> Result<Box<dyn Compositor>>,
+}
+
+/// The compositor of a mode and the length of its window; none for a mode that stands for others.
+fn kind(mode: Blend) -> Option<(&'static Kind, u32)> {
+    match mode {
+        Blend::Interlock(k) => Some((&interlock::KIND, k)),
+        Blend::Attachment(k) => Some((&attachment::KIND, k)),
+        Blend::List => Some((&list::KIND, 1)),
+        Blend::Tiled => Some((&tiled::KIND, 1)),
+        Blend::Alpha => Some((&alpha::KIND, 1)),
+        Blend::Auto | Blend::Exact | Blend::Impostor => None,
+    }
+}
+
+/// Whether a device can run `mode`, or a sentence why not.
+pub fn supports(mode: Blend, capabilities: &Capabilities) -> Result<(), String> {
+    match (mode, kind(mode)) {
+        (_, Some((_, k))) if !WINDOWS.contains(&k) => Err(format!("a window has one of {WINDOWS:?} segments, not {k}")),
+        (_, Some((kind, k))) => (kind.supports)(k, capabilities),
+        (Blend::Auto | Blend::Exact, None) => Ok(()),
+        (other, None) => Err(format!("{other} is not in this version yet")),
+    }
+}
+
+/// Of compositors that run on every device.
+fn anywhere(_: u32, _: &Capabilities) -> Result<(), String> {
+    Ok(())
 }
 
 /// Length of the list of a mode that has one, in nodes.
@@ -184,27 +194,27 @@ pub struct NodeBudget {
 
 /// Draws particles into [`CloudTargets`] by one mode.
 pub struct Blender {
-    mode: Mode,
+    compositor: Box<dyn Compositor>,
     extent: [u32; 2],
 }
 
-/// What the blend pipelines are specialised for.
+/// What the blend pipelines are made for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shading {
-    /// Tables or constant colours.
+    /// Whose source function colours the segments.
     pub lighting: Lighting,
     /// Constant density inside each ellipsoid: no density table, no detail.
     pub homogeneous: bool,
 }
 
 impl Shading {
-    fn specialization(self) -> [(&'static str, u32); 2] {
-        [("LIGHTING", u32::from(self.lighting == Lighting::Flat)), ("HOMOGENEOUS", u32::from(self.homogeneous))]
+    fn specialization(self) -> [(&'static str, u32); 1] {
+        [("HOMOGENEOUS", u32::from(self.homogeneous))]
     }
 }
 
 impl Blender {
-    /// Pipelines and per-pixel state of `mode` (not `Auto`: see [`choose`]) for targets of `extent` pixels.
+    /// Pipelines and per-pixel state of `mode` for targets of `extent` pixels.
     pub fn new(gpu: &Arc<Gpu>, mode: Blend, shading: Shading, extent: [u32; 2], precision: Precision) -> Result<Self> {
         Self::with_nodes(gpu, mode, shading, extent, precision, NodeBudget::default())
     }
@@ -218,45 +228,29 @@ impl Blender {
         precision: Precision,
         budget: NodeBudget,
     ) -> Result<Self> {
-        let mode = match choose(mode, gpu.capabilities())?.used {
-            Blend::Interlock(k) => Mode::Interlock(interlock::Interlock::new(gpu, k, shading, extent)?),
-            Blend::Attachment(k) => Mode::Attachment(attachment::AttachmentMode::new(gpu, k, shading, extent)?),
-            Blend::List => Mode::List(list::List::new(gpu, shading, extent, budget)?),
-            Blend::Tiled => Mode::Tiled(tiled::Tiled::new(gpu, shading, extent, budget)?),
-            _ => Mode::Alpha(alpha::Alpha::new(gpu, shading, precision)?),
+        let used = choose(mode, gpu.capabilities())?.used;
+        let Some((kind, k)) = kind(used) else {
+            return Err(Error::Unsupported { needed: format!("blend mode {used}"), by: "this version".into() });
         };
-        Ok(Self { mode, extent })
+        let compositor = (kind.open)(&Setting { gpu, shading, extent, precision, budget }, k)?;
+        Ok(Self { compositor, extent })
     }
 
     /// Records the drawing of all visible particles.
     pub fn record(&self, rec: &mut Recorder<'_>, inputs: &BlendInputs<'_>, targets: &CloudTargets) -> Result<()> {
-        match &self.mode {
-            Mode::Interlock(mode) => mode.record(rec, inputs, targets, self.extent),
-            Mode::Attachment(mode) => mode.record(rec, inputs, targets, self.extent),
-            Mode::List(mode) => mode.record(rec, inputs, targets, self.extent),
-            Mode::Tiled(mode) => mode.record(rec, inputs, targets),
-            Mode::Alpha(mode) => mode.record(rec, inputs, targets, self.extent),
-        }
+        self.compositor.record(rec, inputs, targets, self.extent)
     }
 
     /// The lists of the mode, if it has any, and what a frame with these `counters` wanted of them.
     #[must_use]
     pub fn lists(&self, counters: &Counters) -> Vec<ListUse> {
-        match &self.mode {
-            Mode::List(mode) => mode.lists(counters),
-            Mode::Tiled(mode) => mode.lists(counters),
-            Mode::Interlock(_) | Mode::Attachment(_) | Mode::Alpha(_) => Vec::new(),
-        }
+        self.compositor.lists(counters)
     }
 
     /// Makes room for the list nodes that the last frame wanted; the device must be idle. True if there was too little:
     /// that frame lacks segments.
     pub fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters) -> Result<bool> {
-        match &mut self.mode {
-            Mode::List(mode) => mode.grow(gpu, counters.blend_nodes),
-            Mode::Tiled(mode) => mode.grow(gpu, counters),
-            Mode::Interlock(_) | Mode::Attachment(_) | Mode::Alpha(_) => Ok(false),
-        }
+        self.compositor.grow(gpu, counters)
     }
 }
 

@@ -4,12 +4,12 @@
 //! Keys → sort → silhouettes and tile counts → prefix sum → pairs of particle and tile → stable sort by tile → ranges →
 //! integral → the pixels that did not fit. The two lists, of particles and of pairs, grow between frames.
 
-use super::{BlendInputs, CloudTargets, NO_CLOUD, NodeBudget, OPTICAL_DEPTH_SAMPLER, Shading};
+use super::{BlendInputs, CloudTargets, Compositor, Kind, NO_CLOUD, OPTICAL_DEPTH_SAMPLER, Setting, anywhere};
 use crate::Result;
 use crate::compact::{Scan, Sort};
 use crate::gpu::{Buffer, ComputePipeline, Gpu, Recorder, Sampler};
-use crate::grid::{Counters, grown};
-use crate::renderer::ListUse;
+use crate::grid::Counters;
+use crate::lists::{ListUse, grown};
 use crate::shaders::{
     blend_tiled_args_comp as args, blend_tiled_comp as integrate, blend_tiled_count_comp as count,
     blend_tiled_emit_comp as emit, blend_tiled_keys_comp as keys, blend_tiled_ranges_comp as ranges,
@@ -86,7 +86,9 @@ struct Pairs {
     sort: Sort,
 }
 
-pub(super) struct Tiled {
+pub(super) const KIND: Kind = Kind { supports: anywhere, open: |setting, _| Ok(Box::new(Tiled::new(setting)?)) };
+
+struct Tiled {
     pipelines: Pipelines,
     particles: Particles,
     pairs: Pairs,
@@ -126,7 +128,9 @@ impl Pairs {
 }
 
 impl Tiled {
-    pub(super) fn new(gpu: &Arc<Gpu>, shading: Shading, extent: [u32; 2], budget: NodeBudget) -> Result<Self> {
+    fn new(setting: &Setting<'_>) -> Result<Self> {
+        let Setting { gpu, shading, extent, budget, .. } = *setting;
+        let lighting = shading.lighting.name();
         let tiles = extent.map(|pixels| pixels.div_ceil(TILE));
         let tile_count = (tiles[0] * tiles[1]) as usize;
         let first = budget.first.unwrap_or(FIRST_NODES).max(1);
@@ -138,8 +142,8 @@ impl Tiled {
                 count: ComputePipeline::new(gpu, &count::PROGRAM, &[])?,
                 emit: ComputePipeline::new(gpu, &emit::PROGRAM, &[])?,
                 ranges: ComputePipeline::new(gpu, &ranges::PROGRAM, &[])?,
-                integrate: ComputePipeline::new(gpu, &integrate::PROGRAM, &constants)?,
-                rest: ComputePipeline::new(gpu, &rest::PROGRAM, &constants)?,
+                integrate: ComputePipeline::new(gpu, integrate::program(lighting), &constants)?,
+                rest: ComputePipeline::new(gpu, rest::program(lighting), &constants)?,
             },
             particles: Particles::new(gpu, first)?,
             pairs: Pairs::new(gpu, first)?,
@@ -150,35 +154,6 @@ impl Tiled {
             rest: Buffer::array::<[u32; 4]>(gpu, "unfinished half tiles", tile_count)?,
             tiles,
         })
-    }
-
-    pub(super) fn lists(&self, counters: &Counters) -> Vec<ListUse> {
-        vec![
-            ListUse { name: "blend_nodes", needed: counters.blend_nodes, capacity: self.pairs.capacity },
-            ListUse { name: "blend_particles", needed: counters.visible, capacity: self.particles.capacity },
-        ]
-    }
-
-    pub(super) fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters) -> Result<bool> {
-        let (few_particles, few_pairs) =
-            (counters.visible > self.particles.capacity, counters.blend_nodes > self.pairs.capacity);
-        if few_particles {
-            self.particles = Particles::new(gpu, grown(counters.visible))?;
-        }
-        if few_pairs {
-            self.pairs = Pairs::new(gpu, grown(counters.blend_nodes))?;
-        }
-        Ok(few_particles || few_pairs)
-    }
-
-    pub(super) fn record(
-        &self,
-        rec: &mut Recorder<'_>,
-        inputs: &BlendInputs<'_>,
-        targets: &CloudTargets,
-    ) -> Result<()> {
-        rec.pass("bin", |rec| self.record_bins(rec, inputs))?;
-        rec.pass("blend", |rec| self.record_integral(rec, inputs, targets))
     }
 
     fn record_args(&self, rec: &mut Recorder<'_>, inputs: &BlendInputs<'_>, stage: u32, capacity: u32) -> Result<()> {
@@ -255,15 +230,11 @@ impl Tiled {
                 $program::Bindings {
                     frame: inputs.frame,
                     particles: inputs.particles,
-                    lights: inputs.lights,
                     medium: inputs.medium,
-                    sky_light: inputs.sky_light,
                     optical_depth_lut: inputs.optical_depth_lut.sampled(OPTICAL_DEPTH_SAMPLER),
-                    scattering_lut: inputs.scattering_lut.sampled(Sampler::LinearClamp),
                     detail_tile: inputs.detail_tile.sampled(Sampler::LinearRepeat),
                     opaque_distance: inputs.opaque_distance.sampled(Sampler::NearestClamp),
-                    volume: inputs.volume,
-                    light_volume: inputs.light_volume.sampled(Sampler::LinearClamp),
+                    lighting: inputs.lighting,
                     tile_ranges: &self.ranges,
                     pair_particles: &self.pairs.particles,
                     tile_particles: &self.particles.elements,
@@ -281,5 +252,37 @@ impl Tiled {
         self.record_args(rec, inputs, 3, 0)?;
         let offset = layout::tiled_use::REST_GROUPS as u64;
         rec.dispatch_indirect(&self.pipelines.rest, &bindings!(rest), &self.tiles, &self.in_use, offset)
+    }
+}
+
+impl Compositor for Tiled {
+    fn lists(&self, counters: &Counters) -> Vec<ListUse> {
+        vec![
+            ListUse { name: "blend_nodes", needed: counters.blend_nodes, capacity: self.pairs.capacity },
+            ListUse { name: "blend_particles", needed: counters.visible, capacity: self.particles.capacity },
+        ]
+    }
+
+    fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters) -> Result<bool> {
+        let (few_particles, few_pairs) =
+            (counters.visible > self.particles.capacity, counters.blend_nodes > self.pairs.capacity);
+        if few_particles {
+            self.particles = Particles::new(gpu, grown(counters.visible))?;
+        }
+        if few_pairs {
+            self.pairs = Pairs::new(gpu, grown(counters.blend_nodes))?;
+        }
+        Ok(few_particles || few_pairs)
+    }
+
+    fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        inputs: &BlendInputs<'_>,
+        targets: &CloudTargets,
+        _: [u32; 2],
+    ) -> Result<()> {
+        rec.pass("bin", |rec| self.record_bins(rec, inputs))?;
+        rec.pass("blend", |rec| self.record_integral(rec, inputs, targets))
     }
 }

@@ -7,8 +7,9 @@ use welkin::blend::supports;
 use welkin::gpu::standalone::Standalone;
 use welkin::gpu::{Buffer, BufferKind, Frames, Image, ImageDesc};
 use welkin::output::{BlendStats, CapacityStats, DeviceStats, ParticleStats, PassStats, Picture, TableStats};
-use welkin::params::{Blend, Lighting, Params, Precision, Style};
+use welkin::params::{Blend, Params, Precision};
 use welkin::renderer::{ListUse, Renderer, TableImages};
+use welkin::sky::Sky;
 use welkin::{Error, Result};
 
 use super::args::{PictureArgs, SceneArgs, Size};
@@ -89,12 +90,11 @@ impl Session {
         let frames = device.0.frames();
         let gpu = frames.gpu().clone();
         let renderer = Renderer::new(&gpu, params, [size.width, size.height], frames.slots())?;
-        let tables = match params.clouds.lighting {
-            Lighting::Flat if params.clouds.style == Style::Homogeneous => None,
-            _ => {
-                let cache = places::cache(args.scene.cache.as_deref())?;
-                Some(TableSet::obtain(frames, params, args.tables, &cache, args.scene.device.as_deref())?)
-            }
+        let tables = if Sky::needs_tables(params) {
+            let cache = places::cache(args.scene.cache.as_deref())?;
+            Some(TableSet::obtain(frames, params, args.tables, &cache, args.scene.device.as_deref())?)
+        } else {
+            None
         };
         let unused = ImageDesc {
             name: "unused table",

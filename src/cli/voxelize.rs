@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use welkin::output::{NpyVolume, VdbGrid, VdbWriter, write_json};
-use welkin::params::{PHASES, Params, Source};
+use welkin::params::{PHASES, Params};
 use welkin::voxelize::{Brick, Gathered, Order, VoxelGrid, Voxelizer};
 use welkin::{Error, Result};
 
@@ -161,9 +161,9 @@ fn place(args: &VoxelizeArgs, params: &Params, gathered: &Gathered) -> Result<Vo
         return VoxelGrid::covering(bounds, args.resolution, 0).map_err(named);
     }
     let camera = params.camera.position;
-    let bounds = match params.clouds.source {
-        Source::Particles(_) => gathered.bounds(|_| true),
-        _ => {
+    let bounds = match gathered.endless {
+        false => gathered.bounds(|_| true),
+        true => {
             let near = |at: [f64; 3], axis: usize| (at[axis] - camera[axis]).abs() <= REACH;
             let around = gathered.bounds(|at| near(at, 0) && near(at, 2));
             around.map(|[mut least, mut greatest]| {
@@ -175,8 +175,7 @@ fn place(args: &VoxelizeArgs, params: &Params, gathered: &Gathered) -> Result<Vo
         }
     };
     let bounds = bounds.ok_or_else(|| {
-        let what =
-            if matches!(params.clouds.source, Source::Particles(_)) { "the scene" } else { "5 km of the camera" };
+        let what = if gathered.endless { "5 km of the camera" } else { "the scene" };
         Error::invalid(
             "--bounds",
             "none",

@@ -277,7 +277,7 @@ fn text(words: &[u32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shaders::blend_interlock_frag::PROGRAM;
+    use crate::shaders::blend_interlock_frag::TABLES as PROGRAM;
 
     fn good() -> Spirv {
         Spirv::of(&PROGRAM, ShaderStage::Fragment).unwrap()

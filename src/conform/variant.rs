@@ -14,12 +14,12 @@ pub(super) enum Change {
 }
 
 /// Programs made so far: they live as long as the process, one for each change of each program.
-static MADE: Mutex<Vec<(&'static str, Change, &'static Program)>> = Mutex::new(Vec::new());
+static MADE: Mutex<Vec<(&'static Program, Change, &'static Program)>> = Mutex::new(Vec::new());
 
 /// `program` with `change`.
 pub(super) fn variant(program: &'static Program, change: Change) -> &'static Program {
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((.., variant)) = made.iter().find(|(name, c, _)| *name == program.name && *c == change) {
+    if let Some((.., variant)) = made.iter().find(|(of, c, _)| std::ptr::eq(*of, program) && *c == change) {
         return variant;
     }
     let stages = program.stages.iter().map(|stage| {
@@ -45,7 +45,7 @@ pub(super) fn variant(program: &'static Program, change: Change) -> &'static Pro
         interlock: change != Change::None,
         ..*program
     }));
-    made.push((program.name, change, variant));
+    made.push((program, change, variant));
     variant
 }
 

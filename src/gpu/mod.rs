@@ -32,6 +32,8 @@ pub use pipeline::{
     Attachment, BlendState, ComputePipeline, DefaultFactory, DepthState, GraphicsPipeline, GraphicsState, PipelineDesc,
     PipelineFactory, PipelineKind,
 };
-pub use program::{Binding, BindingKind, BindingSet, Program, Resource, ShaderStage, SpecConstant, Stage};
+pub use program::{
+    Binding, BindingKind, BindingSet, MethodBindings, Program, Resource, ShaderStage, SpecConstant, Stage,
+};
 pub use recorder::{Draw, DrawCall, PassState, Recorder, RecorderState, Target};
 pub use timing::PassTime;

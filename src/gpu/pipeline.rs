@@ -120,6 +120,9 @@ impl BlendState {
 impl fmt::Display for PipelineDesc {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.program.name)?;
+        if !self.program.lighting.is_empty() {
+            write!(f, " for {} lighting", self.program.lighting)?;
+        }
         match &self.kind {
             PipelineKind::Compute => {
                 let [x, y, z] = self.program.group_size;

@@ -8,6 +8,8 @@ use ash::vk;
 pub struct Program {
     /// Path of the entry file below `glsl/`; for a graphics program, of the fragment shader.
     pub name: &'static str,
+    /// The lighting method that it was compiled for, a folder of `glsl/lighting`; empty where there is one program for all.
+    pub lighting: &'static str,
     /// One compute stage, or vertex and fragment.
     pub stages: &'static [Stage],
     /// Descriptors of set 0, sorted by binding number.
@@ -124,4 +126,28 @@ pub enum Resource<'a> {
     Image(&'a Image),
     /// An image read through a sampler.
     Sampled(Sampled<'a>),
+}
+
+/// What the source function of a lighting method reads (`glsl/lighting/METHOD/source.glsl`), by name: the part of a compositing
+/// program's bindings that the program's mode knows nothing of.
+#[derive(Clone, Copy)]
+pub struct MethodBindings<'a> {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Its resources by the names that they have in the shader.
+    pub resources: &'a [(&'static str, Resource<'a>)],
+}
+
+impl<'a> MethodBindings<'a> {
+    /// The resource that the shader calls `name`.
+    ///
+    /// # Panics
+    /// If the method did not give one.
+    #[must_use]
+    pub fn resource(&self, name: &str) -> Resource<'a> {
+        match self.resources.iter().find(|(known, _)| *known == name) {
+            Some((_, resource)) => *resource,
+            None => panic!("the lighting method {} gives no {name}, which its source.glsl reads", self.method),
+        }
+    }
 }

@@ -20,12 +20,12 @@ use std::sync::Arc;
 use crate::Result;
 use crate::compact::Scan;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Recorder};
+use crate::lists::grown;
 use crate::params::Coverage;
 use crate::shaders::{grid_args_comp as args, grid_classify_comp as classify, grid_emit_comp as emit};
 
 pub use list::ParticleList;
 pub use params::{GridDesign, GridParams};
-pub(crate) use set::grown;
 pub use set::{CounterReadback, Counters, ParticleSet};
 
 /// Byte offset, in [`Grid::args`], of the dispatch over valid cells.

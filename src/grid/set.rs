@@ -6,7 +6,8 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::Result;
 use crate::gpu::{Buffer, BufferKind, Gpu, Recorder};
-use crate::shared::{Particle, ParticleLight, assert_layout};
+use crate::lists::grown;
+use crate::shared::{Particle, assert_layout};
 
 /// Counts of one frame (`glsl/grid/counters.glsl`). A list counts what it was asked to hold, also past its capacity.
 #[repr(C)]
@@ -45,16 +46,10 @@ impl Counters {
     pub const VISIBLE: u32 = 4;
 }
 
-/// A quarter more than needed, so that a slowly growing need does not reallocate every frame.
-pub(crate) fn grown(needed: u32) -> u32 {
-    needed.saturating_add(needed / 4).saturating_add(64)
-}
-
-/// Particles, their cells, their light, their counts and the arguments of dispatches over them.
+/// Particles, their cells, their counts and the arguments of dispatches over them.
 pub struct ParticleSet {
     particles: Buffer,
     cells: Buffer,
-    lights: Buffer,
     counters: Buffer,
     args: Buffer,
     capacity: u32,
@@ -68,7 +63,6 @@ impl ParticleSet {
         Ok(Self {
             particles: Buffer::array::<Particle>(gpu, "particles", count)?,
             cells: Buffer::array::<u32>(gpu, "particle cells", count)?,
-            lights: Buffer::array::<ParticleLight>(gpu, "particle lights", count)?,
             counters: Buffer::array::<Counters>(gpu, "counters", 1)?,
             args: Buffer::array::<[u32; 4]>(gpu, "particle args", 2)?,
             capacity,
@@ -88,12 +82,6 @@ impl ParticleSet {
     #[must_use]
     pub fn cells(&self) -> &Buffer {
         &self.cells
-    }
-
-    /// Light that reaches each particle ([`ParticleLight`]).
-    #[must_use]
-    pub fn lights(&self) -> &Buffer {
-        &self.lights
     }
 
     /// The frame's [`Counters`].

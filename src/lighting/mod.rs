@@ -1,136 +1,110 @@
-//! Light that reaches each particle: the sun's, dimmed by the particles in front (Yusov 5.3), and the sky's.
+//! How particles come to shine: one module, one folder of `glsl/lighting` and one oracle for each method.
 //!
-//! ```text
-//! let lighting = Lighting::new(&gpu, set.capacity())?;
-//! rec.pass("lighting", |rec| lighting.record(rec, &tiling, &set, Some(&grid), &clouds))?;
-//! ```
+//! A method owns its passes and resources. Once a frame it finds the light of all particles, once a picture what visible ones
+//! show of it, and compositing asks its `source.glsl` for the colour of each segment (`glsl/lighting/hit.glsl`). A new one
+//! touches its own folders, [`Lighting`] with its row in [`LIGHTINGS`](crate::params::LIGHTINGS), the scene's keys if it has any,
+//! and [`open`].
 //!
-//! Other shaders get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
+//! Shaders of any method get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
 
-pub mod volume;
+mod flat;
+pub mod tables;
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::Result;
-use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Recorder};
-use crate::grid::{Grid, GridParams, ParticleSet};
-use crate::params::{Clouds, Transfer};
-use crate::shaders::{lighting_smooth_comp as smooth, lighting_sun_comp as sun};
-use crate::shared::ParticleLight;
+use crate::compact::Compact;
+use crate::gpu::{Buffer, Gpu, Image, Recorder, Resource};
+use crate::grid::{Counters, Grid, ParticleSet};
+use crate::lists::ListUse;
+use crate::params::{Lighting, Params};
+use crate::source::{Layer, Place, Spread};
 use crate::tiling::Tiling;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct SunPush {
-    xi: f32,
-    transfer: u32,
-    voxel: f32,
+/// What a method is made for.
+pub(crate) struct Setting<'a> {
+    pub gpu: &'a Arc<Gpu>,
+    pub params: &'a Params,
+    /// How the source's particles are spread.
+    pub spread: Spread,
+    /// Particles that the set holds.
+    pub capacity: u32,
+    /// Frames in flight.
+    pub slots: usize,
 }
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct SmoothPush {
-    smoothing: f32,
+/// The particles of a frame and what light needs to know of them.
+pub(crate) struct Scene<'a> {
+    pub params: &'a Params,
+    pub set: &'a ParticleSet,
+    pub tiling: &'a Tiling,
+    /// The grid's cells, if particles come from a grid.
+    pub cells: Option<&'a Grid>,
+    pub place: &'a Place,
+    pub layer: &'a Layer,
+    /// Unit direction towards the sun.
+    pub to_sun: [f64; 3],
+    /// Mean density of a particle along a chord through its centre.
+    pub fill: f32,
 }
 
-/// Computes [`ParticleLight`] for every stored particle.
-pub struct Lighting {
-    sun: ComputePipeline,
-    smooth: ComputePipeline,
-    sun_light: Buffer,
-    sun_depths: Buffer,
-    /// Stand-ins for the grid's lists when particles come from a list.
-    no_grid: [Buffer; 3],
-    capacity: u32,
+/// A view of the frame.
+pub(crate) struct Seen<'a> {
+    /// [`FrameParams`](crate::shared::FrameParams) of the view.
+    pub frame: &'a Buffer,
+    pub set: &'a ParticleSet,
+    pub compact: &'a Compact,
 }
 
-impl Lighting {
-    /// For lists of `capacity` particles.
-    pub fn new(gpu: &Arc<Gpu>, capacity: u32) -> Result<Self> {
-        let no_grid = [
-            Buffer::new(gpu, "no grid params", size_of::<GridParams>() as u64, BufferKind::Upload)?,
-            Buffer::array::<[f32; 4]>(gpu, "no cell shapes", 1)?,
-            Buffer::array::<u32>(gpu, "no cell first", 1)?,
-        ];
-        no_grid[0].write(0, &[GridParams::zeroed()]);
-        Ok(Self {
-            sun: ComputePipeline::new(gpu, &sun::PROGRAM, &[])?,
-            smooth: ComputePipeline::new(gpu, &smooth::PROGRAM, &[])?,
-            sun_light: Buffer::array::<ParticleLight>(gpu, "sun light", capacity as usize)?,
-            sun_depths: Buffer::array::<[f32; 4]>(gpu, "sun depths", capacity as usize)?,
-            no_grid,
-            capacity,
-        })
+/// What others lend a method's source function.
+pub(crate) struct Lent<'a> {
+    /// Frame slot.
+    pub slot: usize,
+    /// Scattering table.
+    pub scattering: &'a Image,
+    /// [`SkyLight`](crate::atmosphere::SkyLight).
+    pub sky_light: &'a Buffer,
+}
+
+/// A way of lighting particles.
+pub(crate) trait Method {
+    /// Finds the light of all particles, once a frame.
+    fn record(&mut self, rec: &mut Recorder<'_>, scene: &Scene<'_>) -> Result<()>;
+
+    /// Finds what visible particles show of it, once a picture.
+    fn record_seen(&self, _: &mut Recorder<'_>, _: &Seen<'_>) -> Result<()> {
+        Ok(())
     }
 
-    /// [`ParticleLight`] of every particle before smoothing, without the sky.
-    #[must_use]
-    pub fn sun_light(&self) -> &Buffer {
-        &self.sun_light
-    }
+    /// What the method's `source.glsl` reads, by the names that it has there.
+    fn resources<'a>(&'a self, lent: &Lent<'a>) -> Vec<(&'static str, Resource<'a>)>;
 
-    /// Of every particle the optical depths of others towards the sun at the pole that faces it, at its centre and at its far
-    /// pole, and its own diameter's.
-    #[must_use]
-    pub fn sun_depths(&self) -> &Buffer {
-        &self.sun_depths
-    }
+    /// Follows a set that has grown, and makes room in lists of its own for what a frame with these counts wanted. True if
+    /// anything was too small.
+    fn grow(&mut self, gpu: &Arc<Gpu>, counters: &Counters, set: &ParticleSet) -> Result<bool>;
 
-    /// Follows a [`ParticleSet`] that has grown; the device must be idle. True if it did.
-    pub fn grow(&mut self, gpu: &Arc<Gpu>, set: &ParticleSet) -> Result<bool> {
-        if set.capacity() <= self.capacity {
-            return Ok(false);
-        }
-        *self = Self::new(gpu, set.capacity())?;
-        Ok(true)
+    /// Its lists, and what a frame with these counts wanted of them.
+    fn lists(&self, _: &Counters) -> Vec<ListUse> {
+        Vec::new()
     }
+}
 
-    /// Records occlusion and smoothing. `grid` is none for explicit particles, which are not smoothed and see the whole
-    /// sky. `voxel`: edge of the voxels in which light diffuses ([`volume::LightVolume::voxel_edge`]) [m].
-    pub fn record(
-        &self,
-        rec: &mut Recorder<'_>,
-        tiling: &Tiling,
-        set: &ParticleSet,
-        grid: Option<&Grid>,
-        clouds: &Clouds,
-        voxel: f32,
-    ) -> Result<()> {
-        assert!(set.capacity() <= self.capacity, "the particle set has grown: call grow() too");
-        let slot = rec.slot();
-        rec.dispatch_indirect(
-            &self.sun,
-            &sun::Bindings {
-                params: tiling.params(slot),
-                occluders: tiling.occluders(),
-                tile_heads: tiling.heads(),
-                tile_nodes: tiling.nodes(),
-                counters: set.counters(),
-                sun: &self.sun_light,
-                sun_depths: &self.sun_depths,
-            },
-            &SunPush { xi: clouds.xi, transfer: u32::from(clouds.transfer == Transfer::Exponential), voxel },
-            set.args(),
-            ParticleSet::PARTICLE_ARGS,
-        )?;
-        let [no_params, no_shapes, no_first] = &self.no_grid;
-        rec.dispatch_indirect(
-            &self.smooth,
-            &smooth::Bindings {
-                params: grid.map_or(no_params, |grid| grid.params(slot)),
-                counters: set.counters(),
-                particles: set.particles(),
-                particle_cells: set.cells(),
-                cell_shapes: grid.map_or(no_shapes, Grid::cell_shapes),
-                cell_first: grid.map_or(no_first, Grid::cell_first),
-                sun: &self.sun_light,
-                particle_lights: set.lights(),
-            },
-            &SmoothPush { smoothing: clouds.smoothing },
-            set.args(),
-            ParticleSet::PARTICLE_ARGS,
-        )
+/// The method that the parameters ask for.
+///
+/// # Errors
+/// [`Error::OutOfMemory`](crate::Error::OutOfMemory) and what else Vulkan says.
+///
+/// # Panics
+/// If [`Params::validate`] does not let the method pass.
+pub(crate) fn open(setting: &Setting<'_>) -> Result<Box<dyn Method>> {
+    match setting.params.clouds.lighting {
+        Lighting::Tables => Ok(Box::new(tables::TableLight::new(setting)?)),
+        Lighting::Flat => Ok(Box::new(flat::Flat)),
+        later @ (Lighting::Forward
+        | Lighting::Attenuation
+        | Lighting::March
+        | Lighting::MarchCached
+        | Lighting::MarchMulti
+        | Lighting::Path) => panic!("validation has let the lighting method {} pass", later.name()),
     }
 }

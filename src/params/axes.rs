@@ -1,6 +1,7 @@
 //! The choices that have names, and which of them this version has: one table per axis.
 //!
-//! A later version turns a row's `here` to true, and adds its combination to [`COMBINATIONS`]; nothing else changes.
+//! Scene files, `welkin devices`, `docs/scene.md` and the errors for what is not here or does not go together are made from
+//! these tables.
 
 use super::{Blend, Lighting, Params, Phase, Source, Style, Transfer};
 use crate::{Error, Result};
@@ -10,18 +11,55 @@ use crate::{Error, Result};
 pub struct AxisValue<T: 'static> {
     /// As a scene file or the command line writes it.
     pub name: &'static str,
-    /// What it means.
+    /// What it stands for.
     pub value: T,
     /// Whether this version has it.
     pub here: bool,
+    /// What it means, in a few words.
+    pub about: &'static str,
 }
 
-const fn here<T>(name: &'static str, value: T) -> AxisValue<T> {
-    AxisValue { name, value, here: true }
+/// A lighting method.
+#[derive(Clone, Copy, Debug)]
+pub struct LightingMethod {
+    /// Its name and meaning. The name is also that of its folder in `glsl/lighting`.
+    pub axis: AxisValue<Lighting>,
+    /// Whose clouds it can light.
+    pub sources: &'static [SourceKind],
+    /// Whether it reads the scattering table.
+    pub reads_tables: bool,
 }
 
-const fn later<T>(name: &'static str, value: T) -> AxisValue<T> {
-    AxisValue { name, value, here: false }
+/// A row of a table of names.
+pub trait Row {
+    /// What its names stand for.
+    type Value: Copy + 'static;
+    /// The name and what it stands for.
+    fn axis(&self) -> &AxisValue<Self::Value>;
+}
+
+impl<T: Copy + 'static> Row for AxisValue<T> {
+    type Value = T;
+
+    fn axis(&self) -> &Self {
+        self
+    }
+}
+
+impl Row for LightingMethod {
+    type Value = Lighting;
+
+    fn axis(&self) -> &AxisValue<Lighting> {
+        &self.axis
+    }
+}
+
+const fn here<T>(name: &'static str, value: T, about: &'static str) -> AxisValue<T> {
+    AxisValue { name, value, here: true, about }
+}
+
+const fn later<T>(name: &'static str, value: T, about: &'static str) -> AxisValue<T> {
+    AxisValue { name, value, here: false, about }
 }
 
 /// The kinds of cloud source, without their data.
@@ -48,76 +86,124 @@ impl Source {
 }
 
 /// `clouds.source`.
-pub const SOURCES: &[AxisValue<SourceKind>] =
-    &[here("grid", SourceKind::Grid), here("particles", SourceKind::Particles), later("voxels", SourceKind::Voxels)];
+pub const SOURCES: &[AxisValue<SourceKind>] = &[
+    here("grid", SourceKind::Grid, "procedural, around the camera"),
+    here("particles", SourceKind::Particles, "an explicit list"),
+    later("voxels", SourceKind::Voxels, "a volume from a file"),
+];
+
+const PARTICLES: &[SourceKind] = &[SourceKind::Grid, SourceKind::Particles];
 
 /// `clouds.lighting`.
-pub const LIGHTINGS: &[AxisValue<Lighting>] = &[
-    here("tables", Lighting::Tables),
-    here("flat", Lighting::Flat),
-    later("forward", Lighting::Forward),
-    later("attenuation", Lighting::Attenuation),
-    later("march", Lighting::March),
-    later("march-cached", Lighting::MarchCached),
-    later("march-multi", Lighting::MarchMulti),
-    later("path", Lighting::Path),
+pub const LIGHTINGS: &[LightingMethod] = &[
+    LightingMethod {
+        axis: here("tables", Lighting::Tables, "pre-computed scattering, and light that diffuses among particles"),
+        sources: PARTICLES,
+        reads_tables: true,
+    },
+    LightingMethod {
+        axis: here("flat", Lighting::Flat, "each particle its own colour"),
+        sources: &[SourceKind::Particles],
+        reads_tables: false,
+    },
+    LightingMethod {
+        axis: later("forward", Lighting::Forward, "multiple forward scattering"),
+        sources: PARTICLES,
+        reads_tables: false,
+    },
+    LightingMethod {
+        axis: later("attenuation", Lighting::Attenuation, "transmittance in a volume, summed in any order"),
+        sources: PARTICLES,
+        reads_tables: false,
+    },
+    LightingMethod {
+        axis: later("march", Lighting::March, "ray marching with shadow rays"),
+        sources: &[],
+        reads_tables: false,
+    },
+    LightingMethod {
+        axis: later("march-cached", Lighting::MarchCached, "ray marching with cached transmittance"),
+        sources: &[],
+        reads_tables: false,
+    },
+    LightingMethod {
+        axis: later("march-multi", Lighting::MarchMulti, "ray marching with several orders of scattering"),
+        sources: &[],
+        reads_tables: false,
+    },
+    LightingMethod { axis: later("path", Lighting::Path, "path tracing"), sources: &[], reads_tables: false },
 ];
 
 /// `quality.blend` and `--blend`.
 pub const BLENDS: &[AxisValue<Blend>] = &[
-    here("auto", Blend::Auto),
-    here("interlock", Blend::Interlock(1)),
-    here("attachment", Blend::Attachment(1)),
-    here("alpha", Blend::Alpha),
-    here("list", Blend::List),
-    here("tiled", Blend::Tiled),
-    later("impostor", Blend::Impostor),
+    here("auto", Blend::Auto, "the best of interlock, attachment and alpha that the device has"),
+    here("exact", Blend::Exact, "the cheapest of tiled and list that the device has"),
+    here("interlock", Blend::Interlock(1), "volume-aware, ordered by fragment shader interlock"),
+    here("attachment", Blend::Attachment(1), "volume-aware, ordered by rasterization-order attachment access"),
+    here("alpha", Blend::Alpha, "sorted, overlap ignored"),
+    here("list", Blend::List, "exact, from lists of all segments"),
+    here("tiled", Blend::Tiled, "exact, from particles binned to screen tiles"),
+    later("impostor", Blend::Impostor, "dynamic impostors"),
 ];
 
 /// `clouds.style`.
 pub const STYLES: &[AxisValue<Style>] = &[
-    here("pyroclastic", Style::Pyroclastic),
-    here("radial", Style::Radial),
-    here("threshold", Style::Threshold),
-    here("homogeneous", Style::Homogeneous),
+    here("pyroclastic", Style::Pyroclastic, "a ball whose surface noise displaces"),
+    here("radial", Style::Radial, "radial fall-off and noise"),
+    here("threshold", Style::Threshold, "noise above a threshold"),
+    here("homogeneous", Style::Homogeneous, "constant 1"),
 ];
 
 /// `clouds.transfer`.
-pub const TRANSFERS: &[AxisValue<Transfer>] =
-    &[here("diffusion", Transfer::Diffusion), here("exponential", Transfer::Exponential)];
+pub const TRANSFERS: &[AxisValue<Transfer>] = &[
+    here("diffusion", Transfer::Diffusion, "light diffuses through all particles"),
+    here("exponential", Transfer::Exponential, "light fades as exp(-ξ τ)"),
+];
 
 /// `clouds.phase`.
-pub const PHASES: &[AxisValue<Phase>] =
-    &[here("cornette-shanks", Phase::CornetteShanks), here("henyey-greenstein", Phase::HenyeyGreenstein)];
-
-/// Which lightings each source can have, among those that are here.
-const COMBINATIONS: &[(SourceKind, Lighting)] = &[
-    (SourceKind::Grid, Lighting::Tables),
-    (SourceKind::Particles, Lighting::Tables),
-    (SourceKind::Particles, Lighting::Flat),
+pub const PHASES: &[AxisValue<Phase>] = &[
+    here("cornette-shanks", Phase::CornetteShanks, "Cornette and Shanks"),
+    here("henyey-greenstein", Phase::HenyeyGreenstein, "Henyey and Greenstein"),
 ];
+
+impl Lighting {
+    /// The row of this method in [`LIGHTINGS`].
+    #[must_use]
+    pub fn row(self) -> &'static LightingMethod {
+        match LIGHTINGS.iter().find(|row| row.axis.value == self) {
+            Some(row) => row,
+            None => panic!("{self:?} has no row in the table of lighting methods"),
+        }
+    }
+
+    /// As a scene file writes it; also the method's folder in `glsl/lighting`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.row().axis.name
+    }
+}
 
 /// The value that `name` stands for; `field` is what an error calls it.
 ///
 /// # Errors
 /// [`Error::InvalidParam`] with the list of names.
-pub fn lookup<T: Copy>(table: &[AxisValue<T>], field: &str, name: &str) -> Result<T> {
-    table.iter().find(|row| row.name == name).map(|row| row.value).ok_or_else(|| {
-        let names: Vec<_> = table.iter().map(|row| row.name).collect();
+pub fn lookup<R: Row>(table: &[R], field: &str, name: &str) -> Result<R::Value> {
+    table.iter().map(Row::axis).find(|row| row.name == name).map(|row| row.value).ok_or_else(|| {
+        let names: Vec<_> = table.iter().map(|row| row.axis().name).collect();
         Error::invalid(field, name, format!("one of {}", names.join(", ")))
     })
 }
 
 /// The name of the value that `is` picks; every value of an axis has a row.
-pub(super) fn name_of<T>(table: &[AxisValue<T>], is: impl Fn(&T) -> bool) -> &'static str {
-    table.iter().find(|row| is(&row.value)).map_or("unnamed", |row| row.name)
+pub(super) fn name_of<R: Row>(table: &[R], is: impl Fn(&R::Value) -> bool) -> &'static str {
+    table.iter().map(Row::axis).find(|row| is(&row.value)).map_or("unnamed", |row| row.name)
 }
 
 /// An error when the row that `is` picks is not in this version.
-fn require_here<T>(table: &[AxisValue<T>], field: &str, is: impl Fn(&T) -> bool) -> Result<()> {
-    match table.iter().find(|row| is(&row.value)) {
+fn require_here<R: Row>(table: &[R], field: &str, is: impl Fn(&R::Value) -> bool) -> Result<()> {
+    match table.iter().map(Row::axis).find(|row| is(&row.value)) {
         Some(row) if !row.here => {
-            let names: Vec<_> = table.iter().filter(|row| row.here).map(|row| row.name).collect();
+            let names: Vec<_> = table.iter().map(Row::axis).filter(|row| row.here).map(|row| row.name).collect();
             Err(not_yet(format!("{field} = {:?}", row.name), &names.join(", ")))
         }
         _ => Ok(()),
@@ -128,22 +214,36 @@ fn not_yet(needed: String, has: &str) -> Error {
     Error::Unsupported { needed, by: format!("this version yet (it has {has})") }
 }
 
+/// The lighting methods of this version that clouds from `source` can have.
+#[must_use]
+pub fn lightings_of(source: SourceKind) -> Vec<&'static LightingMethod> {
+    LIGHTINGS.iter().filter(|row| row.axis.here && row.sources.contains(&source)).collect()
+}
+
 /// Checks that this version has what `params` choose.
 pub(super) fn validate(params: &Params) -> Result<()> {
     let (source, lighting, blend) = (params.clouds.source.kind(), params.clouds.lighting, params.quality.blend);
     require_here(SOURCES, "clouds.source", |value| *value == source)?;
     require_here(LIGHTINGS, "clouds.lighting", |value| *value == lighting)?;
     require_here(BLENDS, "quality.blend", |value| value.same_kind(&blend))?;
-    if !COMBINATIONS.contains(&(source, lighting)) {
-        let source_name = name_of(SOURCES, |value| *value == source);
-        let lighting_name = name_of(LIGHTINGS, |value| *value == lighting);
-        let has: Vec<_> = COMBINATIONS
-            .iter()
-            .filter(|(s, _)| *s == source)
-            .map(|(_, l)| name_of(LIGHTINGS, |value| value == l))
-            .collect();
-        let needed = format!("clouds.lighting = {lighting_name:?} with clouds.source = {source_name:?}");
-        return Err(not_yet(needed, &has.join(", ")));
+    if !lighting.row().sources.contains(&source) {
+        let (name, source_name) = (lighting.name(), name_of(SOURCES, |value| *value == source));
+        let has: Vec<_> = lightings_of(source).iter().map(|row| row.axis.name).collect();
+        let needed = format!("clouds.lighting = {name:?} with clouds.source = {source_name:?}");
+        return Err(Error::Unsupported { needed, by: format!("any device (this source can have {})", has.join(", ")) });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_lighting_method_that_is_here_has_shaders_and_a_source() {
+        for row in LIGHTINGS.iter().filter(|row| row.axis.here) {
+            assert!(!row.sources.is_empty(), "{}", row.axis.name);
+            assert_eq!(crate::shaders::blend_alpha_frag::program(row.axis.name).lighting, row.axis.name);
+        }
+    }
 }

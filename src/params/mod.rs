@@ -16,7 +16,10 @@ mod sky;
 pub mod solar;
 mod sun;
 
-pub use axes::{AxisValue, BLENDS, LIGHTINGS, PHASES, SOURCES, STYLES, SourceKind, TRANSFERS, lookup};
+pub use axes::{
+    AxisValue, BLENDS, LIGHTINGS, LightingMethod, PHASES, Row, SOURCES, STYLES, SourceKind, TRANSFERS, lightings_of,
+    lookup,
+};
 pub use camera::{Aim, Animation, Basis, Camera};
 pub use clouds::{Clouds, Coverage, CoverageMap, Lighting, ParticleDesc, Phase, Source, Style, Transfer};
 pub use quality::{Blend, Precision, Preset, Quality, WINDOWS};

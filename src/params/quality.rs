@@ -47,8 +47,10 @@ pub enum Precision {
 /// How overlapping particles are composited. As text: the mode's name, and for a window of K segments `:K`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blend {
-    /// The best that the device has.
+    /// The best of `interlock`, `attachment` and `alpha` that the device has.
     Auto,
+    /// The cheapest exact one that the device has.
+    Exact,
     /// Volume-aware blending ordered by fragment shader interlock, a window of K segments per pixel (Yusov 5.5 is K = 1).
     Interlock(u32),
     /// The same merge through rasterization-order attachment access.
@@ -154,7 +156,8 @@ mod tests {
 
     #[test]
     fn blend_modes_read_and_print_alike() {
-        for text in ["auto", "interlock", "interlock:4", "attachment:2", "list", "tiled", "alpha", "impostor"] {
+        for text in ["auto", "exact", "interlock", "interlock:4", "attachment:2", "list", "tiled", "alpha", "impostor"]
+        {
             assert_eq!(text.parse::<Blend>().unwrap().to_string(), text);
         }
         assert_eq!("interlock:1".parse::<Blend>().unwrap(), Blend::Interlock(1));

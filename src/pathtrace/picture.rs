@@ -77,7 +77,7 @@ pub(super) fn develop(tracer: &mut PathTracer, frames: &mut Frames) -> Result<Tr
             let targets = tracer.renderer.targets();
             rec.copy_buffer_to_image(&texels, &targets.cloud);
             rec.copy_buffer_to_image(&nearest, &targets.nearest);
-            tracer.renderer.record_film(rec)?;
+            tracer.renderer.view().record_film(rec, tracer.renderer.sky())?;
             let film = tracer.renderer.film();
             rec.copy_image_to_buffer(&film.scene, &scene);
             rec.make_visible_to_host(&scene);

@@ -13,7 +13,7 @@ use crate::gpu::{Buffer, BufferKind, ComputePipeline, Frames, Image, ImageDesc, 
 use crate::lut::style_index;
 use crate::lut::tables::central_fill;
 use crate::params::{Blend, Film, Lighting, Params, Phase, Precision, SkyModel, Style};
-use crate::renderer::{Renderer, floating_origin};
+use crate::renderer::Renderer;
 use crate::shaders::{lut_profile_comp as profile, pathtrace_trace_comp as trace};
 use crate::shared::{FrameParams, assert_layout};
 use crate::{Error, Result};
@@ -205,10 +205,9 @@ impl PathTracer {
         let mut renderer = Renderer::new(gpu, &params, extent, frames.slots())?;
         let particles = record_until_it_fits(frames, &mut renderer, &params, fill)?;
         let (sigma_t, to_sun) = (params.clouds.sigma_t, params.sun.to_sun().map(|c| c as f32));
-        let grid = CellGrid::build(frames, renderer.parts().set.particles(), particles, sigma_t, to_sun)?;
+        let grid = CellGrid::build(frames, renderer.sky().set().particles(), particles, sigma_t, to_sun)?;
 
-        let origin = floating_origin(params.camera.position);
-        let frame = renderer.frame_params(&params.camera, origin, fill);
+        let frame = renderer.sky().view_params(&params.camera, extent, extent);
         let profile = make_profile(frames, params.clouds.style)?;
         let sky = make_sky(frames, &params, &renderer, &frame)?;
         let clouds = &params.clouds;
@@ -219,7 +218,7 @@ impl PathTracer {
         let sine = (0.5 * f64::from(params.sun.angular_radius)).to_radians().sin();
         let path = PathParams {
             uniform_sky,
-            sky_altitude: renderer.cloud_base().max(1.0),
+            sky_altitude: renderer.sky().cloud_base().max(1.0),
             sun_versine: if options.sun == SunShape::Disc { (2.0 * sine * sine) as f32 } else { 0.0 },
             g_single: clouds.g_single,
             g_multiple: clouds.g_multiple,
@@ -425,7 +424,7 @@ impl PathTracer {
     }
 
     fn dispatch(&self, frames: &mut Frames, push: &TracePush) -> Result<()> {
-        let parts = self.renderer.parts();
+        let (sky, background) = (self.renderer.sky(), self.renderer.view().background());
         let bindings = trace::Bindings {
             frame: &self.frame,
             grid: &self.grid.params,
@@ -433,18 +432,18 @@ impl PathTracer {
             cell_first: &self.grid.cell_first,
             cells: &self.grid.cells,
             entries: &self.grid.entries,
-            particles: parts.set.particles(),
+            particles: sky.set().particles(),
             params: &self.path,
-            air: &parts.atmosphere.air,
-            sky_light: parts.atmosphere.sky_light(),
+            air: &sky.atmosphere().air,
+            sky_light: sky.atmosphere().sky_light(),
             states: &self.states,
             pixels: &self.sums,
             activity: &self.activity,
-            detail_tile: parts.detail.image.sampled(Sampler::LinearRepeat),
+            detail_tile: sky.detail().image.sampled(Sampler::LinearRepeat),
             profile_volume: self.profile.sampled(Sampler::LinearClamp),
             sky_smooth: self.sky.sky_view_smooth.sampled(Sampler::LinearClamp),
             sky_aerosol: self.sky.sky_view_aerosol.sampled(Sampler::LinearClamp),
-            opaque_distance: parts.background.opaque_distance.sampled(Sampler::NearestClamp),
+            opaque_distance: background.opaque_distance.sampled(Sampler::NearestClamp),
         };
         frames.run(|rec| {
             rec.pass("paths", |rec| {
@@ -479,7 +478,7 @@ fn record_until_it_fits(frames: &mut Frames, renderer: &mut Renderer, params: &P
     for _ in 0..TIMES_GROWN {
         let (slot, ()) = frames.submit(|rec| {
             renderer.record_scene(rec, &params.camera, fill)?;
-            renderer.record_counters(rec);
+            renderer.view().record_counters(rec, renderer.sky());
             Ok(())
         })?;
         frames.wait()?;
@@ -509,12 +508,12 @@ fn make_profile(frames: &mut Frames, style: Style) -> Result<Image> {
 /// The sky by direction as the clouds see it: the renderer's tables, filled for an eye at their base.
 fn make_sky(frames: &mut Frames, params: &Params, renderer: &Renderer, frame: &FrameParams) -> Result<Atmosphere> {
     let gpu = &frames.gpu().clone();
-    let cloud_base = renderer.cloud_base();
+    let cloud_base = renderer.sky().cloud_base();
     let mut frame = *frame;
     frame.camera[1] = cloud_base.max(1.0) - frame.origin[1];
     let buffer = Buffer::upload(gpu, "sky frame params", &[frame])?;
     let mut sky = Atmosphere::new(gpu, params.sky.model, &Air::of(&params.sky, &params.sun))?;
-    frames.run(|rec| sky.record_luts(rec, &buffer, &frame, renderer.parts().shadow, cloud_base))?;
+    frames.run(|rec| sky.record_luts(rec, &buffer, &frame, renderer.sky().shadow(), cloud_base))?;
     // Without a sky nothing has written the tables, which are bound all the same.
     frames.run(|rec| {
         if params.sky.model == SkyModel::None {

@@ -1,6 +1,6 @@
-//! Light that diffuses through voxels (`glsl/volume/`), in `f64` and to convergence.
+//! Light that diffuses through voxels (`glsl/lighting/tables/diffusion/`), in `f64` and to convergence.
 
-use crate::lighting::volume::VolumeParams;
+use crate::lighting::tables::volume::VolumeParams;
 
 /// Extinction and extinction × sunlight of a voxel [1/m], from what the device has summed.
 #[must_use]
@@ -98,7 +98,7 @@ impl Volume<'_> {
     }
 
     /// Radiance of every voxel per irradiance of the sun [1/sr], with the share of sunlight that thick voxels scatter for the
-    /// first time (`glsl/volume/store.comp`). `fluence` is [`Self::fluence`]'s or the device's.
+    /// first time (`glsl/lighting/tables/diffusion/store.comp`). `fluence` is [`Self::fluence`]'s or the device's.
     #[must_use]
     pub fn radiance(&self, matter: &[[u32; 2]], fluence: &[f64]) -> Vec<f64> {
         let p = self.0;
@@ -117,7 +117,7 @@ impl Volume<'_> {
     }
 
     /// `radiance` at a point [m, floating origin], and its slope along the axes [1/(m sr)]: of the finest level that reaches
-    /// so far, passing into the next coarser one towards its border (`glsl/volume/seen.comp`).
+    /// so far, passing into the next coarser one towards its border (`glsl/lighting/tables/diffusion/seen.comp`).
     #[must_use]
     pub fn look_up(&self, radiance: &[f64], point: [f64; 3]) -> (f64, [f64; 3]) {
         let last = self.0.levels as usize - 1;

@@ -18,7 +18,8 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Feature, Gpu, Recorder};
-use crate::grid::{Counters, ParticleSet, grown};
+use crate::grid::{Counters, ParticleSet};
+use crate::lists::grown;
 use crate::shaders::{tiling_bin_comp as bin, tiling_order_comp as order_lists};
 
 use interlock::Interlocked;

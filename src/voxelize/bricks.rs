@@ -185,7 +185,7 @@ mod tests {
             particle([-500.0, 0.0, 0.0], [10.0; 3], [0.0, 0.0, 0.0, 1.0]),
             Particle { density: 0.0, ..particle([20.0; 3], [10.0; 3], [0.0, 0.0, 0.0, 1.0]) },
         ];
-        Gathered { particles, origin: [1024.0, 0.0, 0.0] }
+        Gathered { particles, origin: [1024.0, 0.0, 0.0], endless: false }
     }
 
     #[test]

@@ -2,10 +2,10 @@
 
 use super::bricks::half_extent;
 use crate::gpu::{Buffer, BufferKind, Frames};
-use crate::grid::{CounterReadback, Grid, GridDesign, ParticleList, ParticleSet};
-use crate::params::{Params, Source};
-use crate::renderer::{PLANET_RADIUS, floating_origin};
+use crate::grid::{CounterReadback, ParticleSet};
+use crate::params::Params;
 use crate::shared::Particle;
+use crate::source::{self, Place, Spread};
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 
@@ -18,6 +18,8 @@ pub struct Gathered {
     pub particles: Vec<Particle>,
     /// Floating origin [m].
     pub origin: [f64; 3],
+    /// Whether there are more, as far as the eye sees: those of a grid.
+    pub endless: bool,
 }
 
 impl Gathered {
@@ -27,40 +29,25 @@ impl Gathered {
     /// [`Error::InvalidParam`] for parameters out of range; errors of the device.
     pub fn new(frames: &mut Frames, params: &Params) -> Result<Self> {
         params.validate()?;
-        match &params.clouds.source {
-            Source::Particles(list) => {
-                let list = ParticleList::new(&frames.gpu().clone(), list, 1)?;
-                let [least, greatest] = list.bounds();
-                let origin = floating_origin(std::array::from_fn(|axis| 0.5 * (least[axis] + greatest[axis])));
-                let particles = (0..list.count() as usize).map(|index| list.particle(index, origin)).collect();
-                Ok(Self { particles, origin })
-            }
-            _ => Self::of_grid(frames, params),
-        }
-    }
-
-    fn of_grid(frames: &mut Frames, params: &Params) -> Result<Self> {
-        let gpu = frames.gpu().clone();
-        let design = GridDesign::new(&params.clouds, &params.quality, PLANET_RADIUS);
-        let origin = floating_origin(params.camera.position);
-        let place = design.frame(params.camera.position, origin);
-        let slots = frames.slots();
-        let mut grid = Grid::new(&gpu, &design, &params.clouds.coverage, slots)?;
-        let mut set = ParticleSet::new(&gpu, design.particle_estimate())?;
+        let (gpu, slots) = (frames.gpu().clone(), frames.slots());
+        let mut source = source::open(&gpu, params, slots)?;
+        let place = Place::around(source.middle(params.camera.position));
+        let endless = matches!(source.spread(), Spread::Layer { .. });
+        let mut set = ParticleSet::new(&gpu, source.capacity())?;
         let counters = CounterReadback::new(&gpu, slots)?;
         let mut needed = 0;
         for _ in 0..TURNS {
             let (slot, ()) = frames.submit(|rec| {
-                rec.pass("grid", |rec| grid.record(rec, &place, &set))?;
+                rec.pass("grid", |rec| source.record(rec, &place, &set))?;
                 counters.record(rec, &set);
                 Ok(())
             })?;
             frames.wait()?;
             let counts = counters.read(slot);
-            let grew = set.grow(&gpu, &counts)? | grid.grow(&gpu, &counts)?;
+            let grew = set.grow(&gpu, &counts)? | source.grow(&gpu, &counts)?;
             frames.state().forget();
             if !grew {
-                return Ok(Self { particles: read(frames, &set, counts.stored)?, origin });
+                return Ok(Self { particles: read(frames, &set, counts.stored)?, origin: place.origin, endless });
             }
             needed = counts.generated;
         }

@@ -2,20 +2,17 @@
 #![allow(dead_code)] // Each test file uses its own part.
 
 use ash::vk;
-use bytemuck::Zeroable;
 use glam::DVec3;
-use welkin::atmosphere::SkyLight;
 use welkin::blend::medium::MediumParams;
 use welkin::blend::{BlendInputs, Blender, CloudTargets, NO_CLOUD, NodeBudget, Shading};
 use welkin::detail::DetailTile;
 use welkin::gpu::standalone::{Options, Standalone};
-use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc};
+use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc, MethodBindings};
 use welkin::grid::Counters;
-use welkin::lighting::volume::{LightVolume, VolumeDesign};
 use welkin::params::{Aim, Blend, Camera, Clouds, Lighting, Precision};
 use welkin::reference::scene;
 use welkin::reference::segments::{Composite, Segment};
-use welkin::shared::{FrameParams, Particle, ParticleLight};
+use welkin::shared::{FrameParams, Particle};
 
 pub const SIZE: u32 = 64;
 pub const SIGMA_T: f32 = 0.07;
@@ -119,14 +116,11 @@ pub fn draw_with_budget(
 ) -> (Picture, u32) {
     let gpu = device.gpu().clone();
     let order: Vec<u32> = (0..particles.len() as u32).collect();
-    let lights = vec![ParticleLight::OPEN; particles.len()];
     let upload = |name, bytes: &[u8]| Buffer::upload(&gpu, name, bytes).unwrap();
     let frame = upload("frame", bytemuck::bytes_of(&frame()));
     let particle_buffer = upload("particles", bytemuck::cast_slice(particles));
     let order = upload("order", bytemuck::cast_slice(&order));
-    let lights = upload("lights", bytemuck::cast_slice(&lights));
     let medium = upload("medium", bytemuck::bytes_of(&MediumParams::new(&Clouds::default())));
-    let sky_light = Buffer::upload(&gpu, "sky light", &[SkyLight::zeroed()]).unwrap();
     let args = upload("args", bytemuck::bytes_of(&[4u32, particles.len() as u32, 0, 0]));
     let image = |name, extent, format| {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE;
@@ -143,19 +137,14 @@ pub fn draw_with_budget(
     let nearest_bytes = Buffer::new(&gpu, "nearest bytes", 4 * pixels as u64, BufferKind::Readback).unwrap();
     let counters = Buffer::array::<Counters>(&gpu, "counters", 1).unwrap();
     let counts = Buffer::new(&gpu, "counts", counters.size(), BufferKind::Readback).unwrap();
-    let volume = LightVolume::new(&gpu, VolumeDesign::none(), 1).unwrap();
     let inputs = BlendInputs {
         frame: &frame,
         particles: &particle_buffer,
         order: &order,
-        lights: &lights,
         medium: &medium,
-        sky_light: &sky_light,
         optical_depth_lut: &unused,
-        scattering_lut: &unused,
         detail_tile: &detail.image,
-        volume: volume.params(0),
-        light_volume: volume.image(),
+        lighting: MethodBindings { method: Lighting::Flat.name(), resources: &[] },
         opaque_distance: &depth,
         draw_args: &args,
         draw_args_offset: 0,

@@ -5,7 +5,7 @@ use welkin::compact::Compact;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, Recorder};
 use welkin::grid::{CounterReadback, Counters, Grid, GridDesign, GridParams, ParticleSet};
-use welkin::lighting::Lighting;
+use welkin::lighting::tables::Occlusion;
 use welkin::params::{Clouds, Coverage, Quality};
 use welkin::shared::FrameParams;
 use welkin::tiling::{Slab, Tiling, TilingParams};
@@ -88,7 +88,7 @@ pub struct Stages {
     pub set: ParticleSet,
     pub compact: Compact,
     pub tiling: Tiling,
-    pub lighting: Lighting,
+    pub lighting: Occlusion,
     pub counters: CounterReadback,
 }
 
@@ -104,7 +104,7 @@ impl Stages {
             grid: Grid::new(gpu, &setup.design(), &setup.clouds.coverage, slots).unwrap(),
             compact: Compact::new(gpu, set.capacity()).unwrap(),
             tiling: Tiling::new(gpu, setup.quality.rings, set.capacity(), 1 << 22, slots).unwrap(),
-            lighting: Lighting::new(gpu, set.capacity()).unwrap(),
+            lighting: Occlusion::new(gpu, set.capacity()).unwrap(),
             counters: CounterReadback::new(gpu, slots).unwrap(),
             set,
         }

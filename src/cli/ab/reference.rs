@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use welkin::blend::EXACT;
 use welkin::compare::{Reference, oracle};
 use welkin::output::{BlendStats, Picture};
 use welkin::params::{Blend, Params};
@@ -94,7 +95,7 @@ pub fn trace(device: &mut Device, params: &Params, size: [u32; 2], spp: u32, fra
 
 /// An exact mode that the device has, and why that one.
 fn exact(device: &Device, compared: [&str; 2]) -> Result<(Blend, String)> {
-    let modes = [Blend::Tiled, Blend::List].map(|mode| (mode, device.supports(mode)));
+    let modes: Vec<_> = EXACT.iter().map(|&mode| (mode, device.supports(mode))).collect();
     let usable = || modes.iter().filter(|(_, answer)| answer.is_ok()).map(|(mode, _)| *mode);
     // A mode should not be its own judge.
     let other = usable().find(|mode| !compared.contains(&mode.to_string().as_str()));

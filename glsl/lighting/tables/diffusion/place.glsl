@@ -2,7 +2,7 @@
 // buffer `volume.params` (VolumeParams).
 #ifndef WELKIN_VOLUME_PLACE
 #define WELKIN_VOLUME_PLACE
-#include "volume/params.glsl"
+#include "lighting/tables/diffusion/params.glsl"
 
 uint voxel_index(uint level, ivec3 voxel) {
     return (uint(volume.params.stack[level].z + voxel.y) * volume.params.dim + uint(voxel.z)) * volume.params.dim + uint(voxel.x);

@@ -19,8 +19,8 @@ struct VolumeParams {
     float asymmetry;         // mean cosine of scattering
     float shade;             // optical depth over what light lists count, which know ellipsoids without detail
     float body;              // radius, in a particle's, of the ball that holds its matter once detail is taken off [1]
-    float vacuum;            // what fills empty space: see volume/start.comp [1/m]
-    uint  fitted;            // 1: particles are smaller than voxels, and each has a linear fit of what it sees (volume/seen.comp)
+    float vacuum;            // what fills empty space: see diffusion/start.comp [1/m]
+    uint  fitted;            // 1: particles are smaller than voxels, and each has a linear fit of what it sees (lighting/tables/diffusion/seen.comp)
     float reserved_a;
     float reserved_b;
     vec4  corner[VOLUME_LEVELS]; // least x, least z [m, floating origin]; edge of a voxel [m]; 1 / edge

@@ -21,7 +21,7 @@ layout(push_constant) uniform SunPush {
     uint  transfer;    // TRANSFER_*
     float voxel;       // edge of the finest voxels in which light diffuses [m]
 } push;
-#include "lighting/transfer.glsl"
+#include "lighting/tables/transfer.glsl"
 #include "lighting/sun_optical_depth.glsl"
 
 void main() {

@@ -7,7 +7,7 @@
 // light each other.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "volume/params.glsl"
+#include "lighting/tables/diffusion/params.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;
@@ -20,7 +20,7 @@ layout(push_constant) uniform LevelPush {
     float over_relaxation;
 } push;
 
-#include "volume/place.glsl"
+#include "lighting/tables/diffusion/place.glsl"
 
 void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID.xzy);

@@ -1,7 +1,7 @@
 // Where a level has a finer one inside, its voxels get the mean of the four or eight voxels there.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "volume/params.glsl"
+#include "lighting/tables/diffusion/params.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;
@@ -10,7 +10,7 @@ layout(push_constant) uniform ReducePush {
     uint level;   // the coarse one, from 1
 } push;
 
-#include "volume/place.glsl"
+#include "lighting/tables/diffusion/place.glsl"
 
 void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID.xzy);

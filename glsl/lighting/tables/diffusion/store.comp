@@ -1,8 +1,8 @@
-// The solution as radiance: as numbers for volume/seen.comp, or, where particles are larger than voxels, as an image that
+// The solution as radiance: as numbers for diffusion/seen.comp, or, where particles are larger than voxels, as an image that
 // every pixel filters: x, z, and the layers one above the other.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "volume/params.glsl"
+#include "lighting/tables/diffusion/params.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;

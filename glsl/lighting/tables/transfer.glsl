@@ -16,7 +16,7 @@ struct SunShares {
 // this one, from pole to pole; xi: `clouds.xi`; voxel: edge of a voxel, in half chords of the particle along the light.
 //
 // Diffusion. What feeds a particle's own multiple scattering fades slowly, because light that has been scattered forward is
-// still there. Light that its neighbours have scattered is in the volume (volume/start.comp), and so is its own where voxels
+// still there. Light that its neighbours have scattered is in the volume (lighting/tables/diffusion/start.comp), and so is its own where voxels
 // are much smaller than it. Alone (τ = 0) a particle of a list keeps all its light, gets none from others, and the tables hold.
 SunShares sun_shares(vec3 tau, float own, float xi, float voxel, uint transfer) {
     vec3 fading = exp(-xi * tau);

@@ -1,7 +1,7 @@
 //! Sunlight in the depth of the clouds: what particles scatter diffuses through them all.
 //!
 //! Particles are added to nested boxes of voxels around the camera, and the diffusion equation is solved in these, the
-//! coarsest first (`glsl/volume/start.comp` has the equation). The solution is an image of mean radiance, which shading
+//! coarsest first (`glsl/lighting/tables/diffusion/start.comp` has the equation). The solution is an image of mean radiance, which shading
 //! filters at the point that is seen: light passes from particle to particle, and a crowd of them is one cloud.
 
 use std::sync::Arc;
@@ -18,8 +18,9 @@ use crate::params::{Clouds, Style};
 use crate::reference::optical_depth::profile_density;
 use crate::reference::phase::PhaseFunction;
 use crate::shaders::{
-    volume_reduce_comp as reduce, volume_relax_comp as relax, volume_seen_comp as seen, volume_splat_comp as splat,
-    volume_start_comp as start, volume_store_comp as store,
+    lighting_tables_diffusion_reduce_comp as reduce, lighting_tables_diffusion_relax_comp as relax,
+    lighting_tables_diffusion_seen_comp as seen, lighting_tables_diffusion_splat_comp as splat,
+    lighting_tables_diffusion_start_comp as start, lighting_tables_diffusion_store_comp as store,
 };
 use crate::shared::assert_layout;
 
@@ -28,7 +29,7 @@ pub const LEVEL_CAPACITY: usize = 8;
 /// What fills empty space, as an extinction of isotropic scattering [1/m]: clouds closer than its inverse light each other.
 pub const VACUUM: f32 = 1.0 / 240.0;
 
-/// Geometry of the voxels and the medium in them, for one frame (`glsl/volume/params.glsl`).
+/// Geometry of the voxels and the medium in them, for one frame (`glsl/lighting/tables/diffusion/params.glsl`).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct VolumeParams {
@@ -138,7 +139,7 @@ impl VolumeDesign {
 
     /// Voxels for one frame. They keep their places in the world while `centre` moves, so that light does not flicker.
     #[must_use]
-    pub fn frame(&self, place: &Place, medium: &VolumeMedium) -> VolumeParams {
+    pub fn frame(&self, place: &VolumePlace, medium: &VolumeMedium) -> VolumeParams {
         let mut params = VolumeParams::zeroed();
         let mut first = [[0i64; 2]; LEVEL_CAPACITY];
         let mut layer = 0;
@@ -177,7 +178,7 @@ impl VolumeDesign {
 
 /// Where the voxels of a frame lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct VolumePlace {
     /// Middle of the levels [m, floating origin].
     pub centre: [f64; 3],
     /// Floating origin [m].
@@ -324,13 +325,19 @@ impl LightVolume {
         })
     }
 
+    /// Whether [`Self::record_seen`] has anything to do.
+    #[must_use]
+    pub fn fitted(&self) -> bool {
+        self.design.fitted
+    }
+
     /// Edge of a voxel of the finest level [m].
     #[must_use]
     pub fn voxel_edge(&self) -> f32 {
         self.design.edge as f32
     }
 
-    /// This frame's parameters, for shaders that look the light up (`glsl/volume/lookup.glsl`).
+    /// This frame's parameters, for shaders that look the light up (`glsl/lighting/tables/diffusion/lookup.glsl`).
     #[must_use]
     pub fn params(&self, slot: usize) -> &Buffer {
         &self.params[slot]
@@ -371,7 +378,7 @@ impl LightVolume {
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        place: &Place,
+        place: &VolumePlace,
         medium: &VolumeMedium,
         set: &ParticleSet,
         sun_depths: &Buffer,
@@ -435,13 +442,14 @@ impl LightVolume {
     }
 
     /// Records what each visible particle shows of the light, once [`Self::record`] has found it: in its
-    /// [`ParticleLight`](crate::shared::ParticleLight).
+    /// [`ParticleLight`](crate::shared::ParticleLight) in `lights`.
     pub fn record_seen(
         &self,
         rec: &mut Recorder<'_>,
         frame: &Buffer,
         set: &ParticleSet,
         compact: &Compact,
+        lights: &Buffer,
     ) -> Result<()> {
         if !self.design.fitted {
             return Ok(());
@@ -454,7 +462,7 @@ impl LightVolume {
                 counters: set.counters(),
                 particles: set.particles(),
                 order: compact.order(),
-                lights: set.lights(),
+                lights,
                 radiance: &self.radiance,
             },
             &(),

@@ -7,7 +7,7 @@
 #include "common/particle.glsl"
 #include "compact/index.glsl"
 #include "grid/counters.glsl"
-#include "volume/params.glsl"
+#include "lighting/tables/diffusion/params.glsl"
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;
@@ -18,8 +18,8 @@ layout(set = 0, binding = 4, std430) readonly restrict buffer Order { uint parti
 layout(set = 0, binding = 5, std430) restrict buffer ParticleLights { ParticleLight light[]; } lights;
 layout(set = 0, binding = 6, std430) readonly restrict buffer Radiance { float voxel[]; } radiance;
 
-#include "volume/place.glsl"
-#include "volume/seen.glsl"
+#include "lighting/tables/diffusion/place.glsl"
+#include "lighting/tables/diffusion/seen.glsl"
 
 const float RIM = 1.5;     // voxels at the border of a level that are not looked at
 const float BLEND = 4.0;   // voxels next to these, over which a level passes into the next coarser one

@@ -5,7 +5,7 @@
 #include "compact/index.glsl"
 #include "compact/view.glsl"
 #include "grid/counters.glsl"
-#include "volume/params.glsl"
+#include "lighting/tables/diffusion/params.glsl"
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;
@@ -14,7 +14,7 @@ layout(set = 0, binding = 2, std430) readonly restrict buffer Particles { Partic
 layout(set = 0, binding = 3, std430) readonly restrict buffer SunDepths { vec4 at[]; } sun_depths;
 layout(set = 0, binding = 4, std430) restrict buffer Matter { uvec2 voxel[]; } matter;   // extinction; the same × sunlight
 
-#include "volume/place.glsl"
+#include "lighting/tables/diffusion/place.glsl"
 
 // Share of a ball's matter, projected on an axis, that lies below `u` radii from its centre, -1 to 1.
 vec3 below(vec3 u) {

@@ -9,7 +9,7 @@
 #include "grid/shape.glsl"
 #include "grid/counters.glsl"
 #include "compact/index.glsl"
-#include "lighting/sky.glsl"
+#include "lighting/tables/sky.glsl"
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer GridParamsBuffer { GridParams grid; } params;

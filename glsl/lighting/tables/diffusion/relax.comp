@@ -1,7 +1,7 @@
 // Half a sweep of successive over-relaxation: voxels of one colour of the checkerboard.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "volume/params.glsl"
+#include "lighting/tables/diffusion/params.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 0, std430) readonly restrict buffer Volume { VolumeParams params; } volume;
@@ -13,7 +13,7 @@ layout(push_constant) uniform LevelPush {
     float over_relaxation;   // 1 to 2
 } push;
 
-#include "volume/place.glsl"
+#include "lighting/tables/diffusion/place.glsl"
 
 // What a neighbour gives and takes: conductance × φ, and conductance [1/m]. Between two voxels 1 / (3 s) is the harmonic mean.
 vec2 exchange(vec2 there, float s, float inverse_distance2) {
