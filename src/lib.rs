@@ -230,6 +230,7 @@ pub mod shared;
 pub mod sky;
 mod source;
 mod targets;
+mod threads;
 pub mod tiling;
 pub mod view;
 pub mod voxelize;

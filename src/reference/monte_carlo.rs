@@ -5,9 +5,9 @@
 
 use super::phase::PhaseFunction;
 use super::sphere::{LitRay, distance_to_surface};
+pub use crate::threads::parallel;
 use glam::DVec3;
 use std::f64::consts::PI;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The scattering medium of the tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,31 +58,6 @@ fn random_azimuth(state: &mut u64) -> (f64, f64) {
             return (x * scale, y * scale);
         }
     }
-}
-
-/// Runs `work(i)` for i in 0..count on all cores and returns the results in order.
-pub fn parallel<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let next = AtomicUsize::new(0);
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let mut parts: Vec<(usize, T)> = std::thread::scope(|scope| {
-        let handles: Vec<_> = (0..threads)
-            .map(|_| {
-                scope.spawn(|| {
-                    let mut mine = Vec::new();
-                    loop {
-                        let i = next.fetch_add(1, Ordering::Relaxed);
-                        if i >= count {
-                            return mine;
-                        }
-                        mine.push((i, work(i)));
-                    }
-                })
-            })
-            .collect();
-        handles.into_iter().filter_map(|h| h.join().ok()).flatten().collect()
-    });
-    parts.sort_by_key(|(i, _)| *i);
-    parts.into_iter().map(|(_, t)| t).collect()
 }
 
 /// Batches into which the walks of an estimate are split; their spread is its standard error.

@@ -2,8 +2,9 @@
 
 use super::basis::{legendre, order_norm, rotation};
 use super::grid::{Ray, impact_parameters, interpolation, shells, step_weights};
-use crate::reference::monte_carlo::{Medium, parallel};
+use crate::reference::monte_carlo::Medium;
 use crate::reference::quadrature::gauss_legendre;
+use crate::threads::parallel;
 use std::f64::consts::PI;
 
 /// How finely a ball is resolved.
