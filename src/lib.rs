@@ -208,6 +208,7 @@ pub mod compact;
 pub mod compare;
 #[cfg(feature = "conform")]
 pub mod conform;
+pub mod definitions;
 pub mod density;
 pub mod detail;
 pub mod error;

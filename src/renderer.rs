@@ -19,9 +19,6 @@ use crate::view::View;
 pub use crate::frame::TableImages;
 pub use crate::lists::ListUse;
 
-/// Radius of the planet at sea level [m].
-pub const PLANET_RADIUS: f64 = 6.36e6;
-
 /// Records cloudy frames of one scene at one size.
 pub struct Renderer {
     sky: Sky,

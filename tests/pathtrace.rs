@@ -242,7 +242,7 @@ fn every_particle_of_the_procedural_grid_is_met() {
     params.sky.model = SkyModel::None;
     let size = [32, 20];
     let tracer = traced(&mut device, &params, size, PathOptions { seed: 3, ..PathOptions::default() }, 64);
-    let design = welkin::grid::GridDesign::new(&params.clouds, &params.quality, welkin::renderer::PLANET_RADIUS);
+    let design = welkin::grid::GridDesign::new(&params.clouds, &params.quality, welkin::definitions::PLANET_RADIUS);
     let list: Vec<ParticleDesc> = generate(&design.frame(params.camera.position, [0.0; 3]), &[])
         .particles
         .iter()

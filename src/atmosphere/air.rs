@@ -1,5 +1,6 @@
 //! What the clear air is made of: the host's parameters and their device twin.
 
+use crate::definitions::PLANET_RADIUS;
 use crate::params;
 use crate::shared::assert_layout;
 use crate::{Error, Result};
@@ -48,7 +49,7 @@ impl Default for Air {
     /// with cumulus, where theirs would be 220 km. The sun is that of the ASTM G173 extraterrestrial spectrum.
     fn default() -> Self {
         Self {
-            bottom_radius: 6.36e6,
+            bottom_radius: PLANET_RADIUS,
             top_height: 100e3,
             rayleigh_scattering: [5.802e-6, 13.558e-6, 33.1e-6],
             rayleigh_scale_height: 8000.0,

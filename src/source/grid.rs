@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::{Layer, ParticleSource, Place, Spread};
 use crate::Result;
+use crate::definitions::PLANET_RADIUS;
 use crate::gpu::{Gpu, Recorder};
 use crate::grid::{Counters, Grid, GridDesign, ParticleSet};
 use crate::lists::ListUse;
 use crate::params::Params;
-use crate::renderer::PLANET_RADIUS;
 
 pub(super) struct GridSource {
     grid: Grid,

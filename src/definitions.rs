@@ -1,0 +1,4 @@
+//! Constants and plain data that the renderer and its oracles share by definition. No mathematics: each side has its own.
+
+/// Radius of the planet at sea level [m].
+pub const PLANET_RADIUS: f64 = 6.36e6;
