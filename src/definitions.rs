@@ -2,3 +2,6 @@
 
 /// Radius of the planet at sea level [m].
 pub const PLANET_RADIUS: f64 = 6.36e6;
+
+/// Seed of the noise inside the reference particle: there is one for all skies, and particles differ by rotation and detail.
+pub const REFERENCE_SEED: u32 = 1;

@@ -45,7 +45,7 @@ impl Scene {
             let (slot, ()) = (self.device.frames())
                 .submit(|rec| {
                     if let Some(style) = style {
-                        tables.record_style(rec, style, 1)?;
+                        tables.record_style(rec, style)?;
                     }
                     let images = TableImages {
                         optical_depth: tables.optical_depth.image(),

@@ -5,6 +5,7 @@
 
 use super::axes::OpticalDepthShape;
 use crate::Result;
+use crate::definitions::REFERENCE_SEED;
 use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampled, Sampler};
 use crate::params::Style;
 use crate::shaders::{lut_optical_depth_comp as optical_depth, lut_profile_comp as profile};
@@ -72,9 +73,9 @@ impl OpticalDepthTable {
     }
 
     /// Fills the table for a style.
-    pub fn record(&self, rec: &mut Recorder<'_>, style: Style, seed: u32) -> Result<()> {
+    pub fn record(&self, rec: &mut Recorder<'_>, style: Style) -> Result<()> {
         rec.pass("optical depth table", |rec| {
-            let push = ProfilePush { style: style_index(style), seed };
+            let push = ProfilePush { style: style_index(style), seed: REFERENCE_SEED };
             rec.dispatch(&self.profile, &profile::Bindings { volume: &self.volume }, &push, self.volume.extent())?;
             let bindings =
                 optical_depth::Bindings { volume: self.volume.sampled(Sampler::LinearClamp), table: &self.table };

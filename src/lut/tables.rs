@@ -5,6 +5,7 @@ use super::cache::{self, Cached};
 use super::optical_depth::style_index;
 use super::{LevelReport, OpticalDepthTable, ScatteringTable};
 use crate::Result;
+use crate::definitions::REFERENCE_SEED;
 use crate::gpu::{Buffer, BufferKind, Frames, Image, Recorder};
 use crate::params::{Clouds, Style};
 use crate::reference::monte_carlo::Medium;
@@ -37,8 +38,6 @@ pub struct TableParams {
     pub orders: Option<u32>,
     /// Density inside a particle.
     pub style: Style,
-    /// Seed of the style's noise.
-    pub seed: u32,
     /// Resolution.
     pub detail: Detail,
 }
@@ -53,8 +52,7 @@ impl TableParams {
             albedo: f64::from(clouds.albedo),
         };
         let orders = (clouds.orders > 0).then_some(clouds.orders);
-        // One reference particle for all skies: particles differ by rotation and detail noise.
-        Self { medium, orders, style: clouds.style, seed: 1, detail }
+        Self { medium, orders, style: clouds.style, detail }
     }
 
     fn shapes(&self) -> (OpticalDepthShape, ScatteringShape, f64) {
@@ -89,7 +87,7 @@ impl TableParams {
     pub fn optical_depth_file(&self) -> String {
         let mut key = VERSION.to_le_bytes().to_vec();
         key.extend(style_index(self.style).to_le_bytes());
-        key.extend(self.seed.to_le_bytes());
+        key.extend(REFERENCE_SEED.to_le_bytes());
         key.push(self.detail as u8);
         let programs = [&shaders::lut_profile_comp::PROGRAM, &shaders::lut_optical_depth_comp::PROGRAM];
         cache::file_name("optical-depth", &key, &programs.map(|program| program.stages[0].spirv))
@@ -178,7 +176,7 @@ impl Tables {
             optical_depth: OpticalDepthTable::new(&gpu, depth_shape)?,
             scattering: ScatteringTable::new(&gpu, scattering_shape)?,
             reports: Vec::new(),
-            fill: central_fill(params.style, params.seed),
+            fill: central_fill(params.style),
             built: false,
             seconds: 0.0,
             warnings: Vec::new(),
@@ -191,7 +189,7 @@ impl Tables {
                 if progress(Progress { stage: "optical depth", fraction: 0.0 }).is_break() {
                     return Ok(None);
                 }
-                frames.run(|rec| tables.optical_depth.record(rec, params.style, params.seed))?;
+                frames.run(|rec| tables.optical_depth.record(rec, params.style))?;
                 let bytes = download(frames, tables.optical_depth.image())?;
                 tables.keep(path.as_deref(), &bytes);
             }
@@ -252,10 +250,10 @@ impl Tables {
     }
 
     /// Records the change to another style, which is complete when the commands have run.
-    pub fn record_style(&mut self, rec: &mut Recorder<'_>, style: Style, seed: u32) -> Result<()> {
-        self.optical_depth.record(rec, style, seed)?;
-        (self.params.style, self.params.seed) = (style, seed);
-        self.fill = central_fill(style, seed);
+    pub fn record_style(&mut self, rec: &mut Recorder<'_>, style: Style) -> Result<()> {
+        self.optical_depth.record(rec, style)?;
+        self.params.style = style;
+        self.fill = central_fill(style);
         Ok(())
     }
 
@@ -301,14 +299,14 @@ impl Tables {
 }
 
 /// Mean density along 64 chords through the centre, in directions spread evenly.
-pub(crate) fn central_fill(style: Style, seed: u32) -> f32 {
+pub(crate) fn central_fill(style: Style) -> f32 {
     let n = 64;
     let sum: f64 = (0..n)
         .map(|i| {
             let z: f64 = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(n);
             let (s, c) = (2.399_963_229_728_653 * f64::from(i)).sin_cos(); // golden angle
             let entry = DVec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z);
-            mean_density(entry, -entry, style, seed, 64)
+            mean_density(entry, -entry, style, REFERENCE_SEED, 64)
         })
         .sum();
     (sum / f64::from(n)) as f32

@@ -9,6 +9,7 @@ use super::cells::{CellCounts, CellGrid};
 use super::picture::{self, Truth};
 use super::state::{PixelSums, State};
 use crate::atmosphere::{Air, Atmosphere};
+use crate::definitions::REFERENCE_SEED;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Frames, Image, ImageDesc, Sampler};
 use crate::lut::style_index;
 use crate::lut::tables::central_fill;
@@ -35,8 +36,6 @@ const FIRST_STEPS: u32 = 32;
 const PASS_SECONDS: f64 = 2.0;
 /// Points of the density profile along an axis: the lattice that the full optical depth table is made from.
 const PROFILE_LATTICE: u32 = 96;
-/// Seed of the reference particle's noise, as [`TableParams::new`](crate::lut::TableParams::new) has it.
-const PROFILE_SEED: u32 = 1;
 /// How often lists of particles may prove too small.
 const TIMES_GROWN: usize = 8;
 
@@ -201,7 +200,7 @@ impl PathTracer {
             params.sun.irradiance = [0.0; 3];
             params.sky.model = SkyModel::None;
         }
-        let fill = central_fill(params.clouds.style, PROFILE_SEED);
+        let fill = central_fill(params.clouds.style);
         let mut renderer = Renderer::new(gpu, &params, extent, frames.slots())?;
         let particles = record_until_it_fits(frames, &mut renderer, &params, fill)?;
         let (sigma_t, to_sun) = (params.clouds.sigma_t, params.sun.to_sun().map(|c| c as f32));
@@ -499,7 +498,7 @@ fn make_profile(frames: &mut Frames, style: Style) -> Result<Image> {
     let volume = Image::new(gpu, &ImageDesc { name: "path density", extent, format, usage })?;
     let pipeline = ComputePipeline::new(gpu, &profile::PROGRAM, &[])?;
     frames.run(|rec| {
-        let push = [style_index(style), PROFILE_SEED];
+        let push = [style_index(style), REFERENCE_SEED];
         rec.pass("path density", |rec| rec.dispatch(&pipeline, &profile::Bindings { volume: &volume }, &push, extent))
     })?;
     Ok(volume)

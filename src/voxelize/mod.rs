@@ -12,9 +12,10 @@ mod geometry;
 
 use crate::Result;
 use crate::blend::medium::MediumParams;
+use crate::definitions::REFERENCE_SEED;
 use crate::detail::DetailTile;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Frames, Gpu, Sampler};
-use crate::lut::{Detail, TableParams, style_index};
+use crate::lut::style_index;
 use crate::params::Params;
 use crate::shaders::voxelize_bricks_comp as shader;
 use crate::shared::{Particle, assert_layout};
@@ -96,7 +97,7 @@ impl Voxelizer {
             sigma_t: clouds.sigma_t,
             detail: MediumParams::new(clouds).detail,
             style: style_index(clouds.style),
-            seed: TableParams::new(clouds, Detail::Full).seed,
+            seed: REFERENCE_SEED,
             samples,
         };
         let bytes = (BATCH * BRICK_VOXELS * size_of::<f32>()) as u64;

@@ -30,7 +30,7 @@ impl TableLight {
         Ok(Self {
             occlusion: Occlusion::new(setting.gpu, setting.capacity)?,
             volume: LightVolume::new(setting.gpu, volume_design(clouds, &setting.spread), setting.slots)?,
-            mean_profile: mean_profile(clouds.style, clouds.seed),
+            mean_profile: mean_profile(clouds.style),
         })
     }
 }
