@@ -29,11 +29,28 @@ pub struct Truth {
     pub distance: Vec<f32>,
 }
 
+impl PathTracer {
+    /// Relative standard error of the clouds' radiance: root of the summed variances of all pixels' means over the root of
+    /// their summed squares. Infinite below two samples.
+    #[must_use]
+    pub fn noise(&self) -> f64 {
+        noise(&self.pixels, self.samples)
+    }
+
+    /// The picture so far, through the renderer's own air, background and film.
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn develop(&mut self, frames: &mut Frames) -> Result<Truth> {
+        develop(self, frames)
+    }
+}
+
 fn over_samples(m2: f32, samples: u32) -> f32 {
     if samples < 2 { 0.0 } else { m2.max(0.0) / (samples as f32 * (samples - 1) as f32) }
 }
 
-pub(super) fn noise(pixels: &[PixelSums], samples: u32) -> f64 {
+fn noise(pixels: &[PixelSums], samples: u32) -> f64 {
     if samples < 2 {
         return f64::INFINITY;
     }
@@ -51,7 +68,7 @@ pub(super) fn noise(pixels: &[PixelSums], samples: u32) -> f64 {
 /// of each pixel known from three of them, variances follow.
 const PROBES: [[f32; 4]; 3] = [[0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
-pub(super) fn develop(tracer: &mut PathTracer, frames: &mut Frames) -> Result<Truth> {
+fn develop(tracer: &mut PathTracer, frames: &mut Frames) -> Result<Truth> {
     let gpu = &frames.gpu().clone();
     let pixels = &tracer.pixels;
     let count = pixels.len();

@@ -6,7 +6,6 @@ use std::time::Instant;
 use bytemuck::{Pod, Zeroable};
 
 use super::cells::{CellCounts, CellGrid};
-use super::picture::{self, Truth};
 use super::state::{PixelSums, State};
 use crate::atmosphere::{Air, Atmosphere};
 use crate::definitions::REFERENCE_SEED;
@@ -453,21 +452,6 @@ impl PathTracer {
                 Ok(())
             })
         })
-    }
-
-    /// Relative standard error of the clouds' radiance: root of the summed variances of all pixels' means over the root of
-    /// their summed squares. Infinite below two samples.
-    #[must_use]
-    pub fn noise(&self) -> f64 {
-        picture::noise(&self.pixels, self.samples)
-    }
-
-    /// The picture so far, through the renderer's own air, background and film.
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn develop(&mut self, frames: &mut Frames) -> Result<Truth> {
-        picture::develop(self, frames)
     }
 }
 

@@ -6,13 +6,30 @@
 
 use std::path::Path;
 
-use super::schema::ParticleKeys;
+use serde::Deserialize;
+
 use crate::params::ParticleDesc;
 use crate::{Error, Result};
 
 const COLUMNS: [&str; 14] = ["x", "y", "z", "rx", "ry", "rz", "qx", "qy", "qz", "qw", "density", "r", "g", "b"];
 /// Columns up to and including the density; the colour is optional.
 const WITHOUT_COLOUR: usize = 11;
+
+/// One `[[clouds.particle]]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParticleKeys {
+    /// Centre [m].
+    pub centre: [f64; 3],
+    /// Semi-axes [m].
+    pub radii: [f32; 3],
+    /// Quaternion x, y, z, w of any length but 0.
+    pub rotation: Option<[f32; 4]>,
+    /// Relative density.
+    pub density: Option<f32>,
+    /// Flat colour.
+    pub colour: Option<[f32; 3]>,
+}
 
 /// The particles of `[[clouds.particle]]` tables.
 pub fn inline(list: Vec<ParticleKeys>) -> Result<Vec<ParticleDesc>> {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::value::{Datetime, Offset};
 
+use super::particles::ParticleKeys;
 use super::{coverage, particles};
 use crate::params::{
     Aim, Animation, Camera, Clouds, Coverage, Film, Ground, LIGHTINGS, PHASES, Params, Precision, Preset, Quality,
@@ -73,22 +74,6 @@ struct CloudKeys {
     particle: Option<Vec<ParticleKeys>>,
     grid: Option<String>,
     density_scale: Option<f32>,
-}
-
-/// One `[[clouds.particle]]`.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ParticleKeys {
-    /// Centre [m].
-    pub centre: [f64; 3],
-    /// Semi-axes [m].
-    pub radii: [f32; 3],
-    /// Quaternion x, y, z, w of any length but 0.
-    pub rotation: Option<[f32; 4]>,
-    /// Relative density.
-    pub density: Option<f32>,
-    /// Flat colour.
-    pub colour: Option<[f32; 3]>,
 }
 
 #[derive(Deserialize, Default)]

@@ -1,6 +1,6 @@
 //! Which particles touch which brick: by the host, in two steps, so that only one region's lists exist at a time.
 
-use super::gather::Gathered;
+use super::gather::{Gathered, half_extent};
 use super::{BRICK, VoxelBrick, VoxelGrid};
 use crate::shared::Particle;
 use glam::{DQuat, DVec3};
@@ -69,12 +69,6 @@ impl Body {
         let in_ball = (self.to_local * (centre - self.centre)) / self.semi_axes;
         in_ball.length() <= 1.0001 + 0.75f64.sqrt() / self.semi_axes.min_element()
     }
-}
-
-/// Half of the axis-aligned bounding box of a turned ellipsoid.
-pub(super) fn half_extent(rotation: DQuat, semi_axes: DVec3) -> DVec3 {
-    let axes = [DVec3::X * semi_axes.x, DVec3::Y * semi_axes.y, DVec3::Z * semi_axes.z].map(|axis| rotation * axis);
-    axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt)
 }
 
 /// The regions of `grid` that particles touch, in `order`.

@@ -1,6 +1,5 @@
 //! The particles of a scene, on the host.
 
-use super::bricks::half_extent;
 use crate::gpu::{Buffer, BufferKind, Frames};
 use crate::grid::{CounterReadback, ParticleSet};
 use crate::params::Params;
@@ -68,6 +67,12 @@ impl Gathered {
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
             .map(|(least, greatest)| [least.to_array(), greatest.to_array()])
     }
+}
+
+/// Half of the axis-aligned bounding box of a turned ellipsoid.
+pub(super) fn half_extent(rotation: DQuat, semi_axes: DVec3) -> DVec3 {
+    let axes = [DVec3::X * semi_axes.x, DVec3::Y * semi_axes.y, DVec3::Z * semi_axes.z].map(|axis| rotation * axis);
+    axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt)
 }
 
 fn read(frames: &mut Frames, set: &ParticleSet, count: u32) -> Result<Vec<Particle>> {
