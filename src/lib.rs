@@ -95,7 +95,10 @@
 //! | [`film`] | air in front of the clouds, edge-preserving upsampling, compositing, exposure and tone curve |
 //! | [`frame`] | the host's images, in and out |
 //!
-//! [`renderer`] records them in this order; a stage reads what earlier ones wrote. [`gpu`] is the layer below, which derives
+//! A [`sky::Sky`] records what the views of a frame share (particles, light, air), a [`view::View`] what one of them sees
+//! (visible particles, compositing, picture); [`renderer`] is one of each. Source, lighting and compositing are axes: each choice
+//! is a module of its own, chosen by name from one table ([`params::SOURCES`], [`params::LIGHTINGS`], [`params::BLENDS`]).
+//! A stage reads what earlier ones wrote. [`gpu`] is the layer below, which derives
 //! every barrier from what the shaders declare. [`params`] say what is rendered; `scene` reads them from a file, `output`
 //! writes pictures and tables, `compare` measures pictures against a reference (all with feature `files`); [`reference`](mod@reference) holds the oracles: one plain CPU implementation for each stage.
 //! `conform` (with its feature) tries what a driver must do for all this.

@@ -7,7 +7,7 @@ use welkin::Result;
 use welkin::frame::{Output, OutputKind};
 use welkin::gpu::standalone;
 use welkin::gpu::{Capabilities, Feature};
-use welkin::params::{BLENDS, Blend, Params, WINDOWS};
+use welkin::params::{BLENDS, Blend, Params, SOURCES, WINDOWS, lightings_of};
 use welkin::renderer::Renderer;
 
 use super::args::DevicesArgs;
@@ -16,8 +16,16 @@ use super::validation;
 #[derive(Serialize)]
 struct Report {
     devices: Vec<Device>,
+    /// What every device can have in clouds: each source with its lighting methods.
+    sources: Vec<SourceReport>,
     /// Descriptions, if asked for.
     pipelines: Option<Vec<String>>,
+}
+
+#[derive(Serialize)]
+struct SourceReport {
+    source: &'static str,
+    lighting: Vec<&'static str>,
 }
 
 #[derive(Serialize)]
@@ -33,6 +41,8 @@ struct Device {
     missing: Vec<String>,
     /// The mode that `auto` takes; none on a device that cannot be used.
     auto: Option<String>,
+    /// The mode that `exact` takes; none on a device that cannot be used.
+    exact: Option<String>,
     blend: Vec<Mode>,
     timestamps: Answer,
 }
@@ -63,9 +73,20 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     let devices = standalone::devices()?;
     let report = Report {
         devices: devices.iter().enumerate().map(|(index, device)| describe(index, device)).collect(),
+        sources: sources(),
         pipelines: if args.pipelines { Some(pipelines()?) } else { None },
     };
     if args.json { super::print_json(&report) } else { super::print(&text(&report)) }
+}
+
+/// The sources of this version.
+fn sources() -> Vec<SourceReport> {
+    let here = SOURCES.iter().filter(|row| row.here);
+    here.map(|row| SourceReport {
+        source: row.name,
+        lighting: lightings_of(row.value).iter().map(|method| method.axis.name).collect(),
+    })
+    .collect()
 }
 
 /// Every pipeline of a frame of the default scene, on the device that `render` takes by default.
@@ -77,7 +98,11 @@ fn pipelines() -> Result<Vec<String>> {
 }
 
 fn describe(index: usize, device: &Capabilities) -> Device {
-    let modes = BLENDS.iter().filter(|row| row.value != Blend::Auto);
+    let modes = BLENDS.iter().filter(|row| !matches!(row.value, Blend::Auto | Blend::Exact));
+    let taken = |by: Blend| {
+        let choice = device.missing.is_empty().then(|| welkin::blend::choose(by, device).ok());
+        choice.flatten().map(|choice| choice.used.to_string())
+    };
     let blend: Vec<_> = modes
         .map(|row| {
             let windows = |of: fn(u32) -> Blend| {
@@ -89,7 +114,7 @@ fn describe(index: usize, device: &Capabilities) -> Device {
                 windows: match row.value {
                     Blend::Interlock(_) => windows(Blend::Interlock),
                     Blend::Attachment(_) => windows(Blend::Attachment),
-                    _ => None,
+                    Blend::Auto | Blend::Exact | Blend::List | Blend::Tiled | Blend::Alpha | Blend::Impostor => None,
                 },
             }
         })
@@ -102,11 +127,8 @@ fn describe(index: usize, device: &Capabilities) -> Device {
         api: device.api.clone(),
         usable: device.missing.is_empty(),
         missing: device.missing.clone(),
-        auto: if device.missing.is_empty() {
-            welkin::blend::choose(Blend::Auto, device).ok().map(|choice| choice.used.to_string())
-        } else {
-            None
-        },
+        auto: taken(Blend::Auto),
+        exact: taken(Blend::Exact),
         blend,
         timestamps: device.supports(Feature::Timestamps).map_err(str::to_owned).into(),
     }
@@ -138,7 +160,12 @@ fn text(report: &Report) -> String {
             let _ = writeln!(text, "   {mode:<12} {}{windows}", answer_text(answer));
         }
         let _ = writeln!(text, "   {:<12} {}", "auto", device.auto.as_deref().unwrap_or("none"));
+        let _ = writeln!(text, "   {:<12} {}", "exact", device.exact.as_deref().unwrap_or("none"));
         let _ = writeln!(text, "   {:<12} {}", "timestamps", answer_text(&device.timestamps));
+    }
+    let _ = writeln!(text, "Clouds:");
+    for SourceReport { source, lighting } in &report.sources {
+        let _ = writeln!(text, "   {source:<12} lit by {}", lighting.join(", "));
     }
     for pipeline in report.pipelines.iter().flatten() {
         let _ = writeln!(text, "\n{pipeline}");
