@@ -1,7 +1,8 @@
 //! Storage buffers.
 
+use super::Gpu;
+use super::id::next_id;
 use super::memory::{Allocation, MemoryLocation};
-use super::{Gpu, device::next_id};
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;

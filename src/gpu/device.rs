@@ -1,21 +1,13 @@
 //! The device that everything runs on: borrowed handles and what belongs to them.
 
-use super::image::Sampler;
 use super::memory::{Accounting, Allocator, DefaultAllocator, MemoryUse};
 use super::pipeline::{DefaultFactory, PipelineFactory};
-use super::{Capabilities, DeviceFeatures, Feature};
+use super::{Capabilities, DeviceFeatures, Feature, Sampler};
 use crate::{Error, Result};
 use ash::vk::{self, Handle};
 use std::any::Any;
 use std::ffi::CString;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-
-/// A number that no other resource of this process has.
-pub(crate) fn next_id() -> u64 {
-    static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
-}
 
 /// What an engine hands over to [`Gpu::from_raw`].
 pub struct RawDevice {

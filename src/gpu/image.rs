@@ -1,8 +1,9 @@
-//! Images and samplers. Every image that Welkin owns stays in `GENERAL` layout for its whole life; only images that an
+//! Images. Every image that Welkin owns stays in `GENERAL` layout for its whole life; only images that an
 //! engine lends have others (see [`Access`](super::Access)).
 
+use super::id::next_id;
 use super::memory::{Allocation, MemoryLocation};
-use super::{Gpu, device::next_id};
+use super::{Gpu, Sampler};
 use crate::Result;
 use ash::vk;
 use std::sync::Arc;
@@ -203,40 +204,6 @@ pub(crate) const COLOR: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     base_array_layer: 0,
     layer_count: vk::REMAINING_ARRAY_LAYERS,
 };
-
-/// The samplers that Welkin uses.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum Sampler {
-    /// Nearest texel, clamped.
-    NearestClamp,
-    /// (Tri)linear, clamped.
-    LinearClamp,
-    /// (Tri)linear, repeating in every direction.
-    LinearRepeat,
-    /// Trilinear, repeating in x and z, clamped in y: the optical depth table, whose azimuths wrap.
-    LinearRepeatClampRepeat,
-}
-
-impl Sampler {
-    pub(crate) const ALL: [Self; 4] =
-        [Self::NearestClamp, Self::LinearClamp, Self::LinearRepeat, Self::LinearRepeatClampRepeat];
-
-    pub(crate) fn info(self) -> vk::SamplerCreateInfo<'static> {
-        let filter = if self == Self::NearestClamp { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
-        let (clamp, repeat) = (vk::SamplerAddressMode::CLAMP_TO_EDGE, vk::SamplerAddressMode::REPEAT);
-        let [u, v, w] = match self {
-            Self::NearestClamp | Self::LinearClamp => [clamp; 3],
-            Self::LinearRepeat => [repeat; 3],
-            Self::LinearRepeatClampRepeat => [repeat, clamp, repeat],
-        };
-        vk::SamplerCreateInfo::default()
-            .mag_filter(filter)
-            .min_filter(filter)
-            .address_mode_u(u)
-            .address_mode_v(v)
-            .address_mode_w(w)
-    }
-}
 
 /// An image and the sampler that reads it.
 #[derive(Clone, Copy)]

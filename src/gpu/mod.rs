@@ -11,11 +11,13 @@ mod device;
 mod features;
 mod feedback;
 mod frames;
+mod id;
 mod image;
 mod memory;
 mod pipeline;
 mod program;
 mod recorder;
+mod sampler;
 pub mod standalone;
 mod timing;
 
@@ -26,7 +28,7 @@ pub use device::{Gpu, RawDevice};
 pub use features::{DeviceFeatures, FEATURES_WANTED, LimitWanted, limits_wanted};
 pub use feedback::{Feedback, FeedbackPath, create_render_pass};
 pub use frames::Frames;
-pub use image::{Image, ImageDesc, Sampled, Sampler};
+pub use image::{Image, ImageDesc, Sampled};
 pub use memory::{Allocation, Allocator, MemoryLocation, MemoryUse};
 pub use pipeline::{
     Attachment, BlendState, ComputePipeline, DefaultFactory, DepthState, GraphicsPipeline, GraphicsState, PipelineDesc,
@@ -36,4 +38,5 @@ pub use program::{
     Binding, BindingKind, BindingSet, MethodBindings, Program, Resource, ShaderStage, SpecConstant, Stage,
 };
 pub use recorder::{Draw, DrawCall, PassState, Recorder, RecorderState, Target};
+pub use sampler::Sampler;
 pub use timing::PassTime;

@@ -1,6 +1,6 @@
 //! Pipelines, first described as data, then built: an engine can print, change, replace or cache each one.
 
-use super::{BindingKind, BindingSet, Feedback, FeedbackPath, Gpu, Program, ShaderStage, create_render_pass};
+use super::{BindingKind, Feedback, FeedbackPath, Gpu, Program, ShaderStage, create_render_pass};
 use crate::Result;
 use ash::vk;
 use std::fmt;
@@ -292,15 +292,6 @@ impl GraphicsPipeline {
     pub fn desc(&self) -> &PipelineDesc {
         &self.0.desc
     }
-}
-
-pub(crate) fn check_bindings(pipeline: &Pipeline, bindings: &dyn BindingSet) {
-    assert!(
-        std::ptr::eq(pipeline.desc.program, bindings.program()),
-        "pipeline {} was given the bindings of {}",
-        pipeline.desc.program.name,
-        bindings.program().name
-    );
 }
 
 /// Builds the pipeline that `desc` describes.
