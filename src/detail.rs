@@ -2,7 +2,7 @@
 //! details"). Filled once per device by `glsl/detail/billow.comp`, read by `glsl/detail/displace.glsl`.
 
 use crate::Result;
-use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Recorder};
+use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Once, Recorder};
 use crate::shaders::detail_billow_comp as shader;
 use ash::vk;
 use std::sync::Arc;
@@ -13,6 +13,7 @@ pub const TILE_SIZE: u32 = 64;
 /// The tile and what fills it.
 pub struct DetailTile {
     pipeline: ComputePipeline,
+    filled: Once,
     /// 64³ texels: gradient in xyz [1/cell], value in w.
     pub image: Image,
 }
@@ -29,13 +30,15 @@ impl DetailTile {
                 usage: vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::SAMPLED,
             },
         )?;
-        Ok(Self { pipeline: ComputePipeline::new(gpu, &shader::PROGRAM, &[])?, image })
+        Ok(Self { pipeline: ComputePipeline::new(gpu, &shader::PROGRAM, &[])?, filled: Once::new(), image })
     }
 
-    /// Fills the tile.
+    /// Fills the tile, the first time.
     pub fn record(&self, rec: &mut Recorder<'_>) -> Result<()> {
-        rec.pass("detail", |rec| {
-            rec.dispatch(&self.pipeline, &shader::Bindings { tile: &self.image }, &(), [TILE_SIZE; 3])
+        rec.once(&self.filled, |rec| {
+            rec.pass("detail", |rec| {
+                rec.dispatch(&self.pipeline, &shader::Bindings { tile: &self.image }, &(), [TILE_SIZE; 3])
+            })
         })
     }
 }

@@ -30,7 +30,6 @@ pub struct Sky {
     tiling: Tiling,
     light: Box<dyn Method>,
     detail: DetailTile,
-    detail_filled: bool,
     medium: Buffer,
     frame: Vec<Buffer>,
     atmosphere: Atmosphere,
@@ -67,7 +66,6 @@ impl Sky {
             tiling: Tiling::new(gpu, source.levels(), set.capacity(), nodes, slots)?,
             light: lighting::open(&setting)?,
             detail: DetailTile::new(gpu)?,
-            detail_filled: false,
             medium: Buffer::upload(gpu, "medium", &[MediumParams::new(&params.clouds)])?,
             frame,
             atmosphere: Atmosphere::new(gpu, params.sky.model, &Air::of(&params.sky, &params.sun))?,
@@ -131,10 +129,7 @@ impl Sky {
         let place = &now.place;
         let frame = self.frame_params(&Camera { position: centre, ..self.params.camera }, [1, 1], [1, 1], now);
         self.frame[slot].write(0, &[frame]);
-        if !self.detail_filled {
-            self.detail.record(rec)?;
-            self.detail_filled = true;
-        }
+        self.detail.record(rec)?;
         let to_sun = self.params.sun.to_sun();
         let (set, source) = (&self.set, &mut self.source);
         rec.pass("grid", |rec| source.record(rec, place, set))?;

@@ -1,7 +1,8 @@
 //! The Vulkan layer itself: resources, recording, derived barriers, timestamps, validation, leaks.
 
+use welkin::Error;
 use welkin::gpu::standalone::{Options, Standalone};
-use welkin::gpu::{Buffer, BufferKind, ComputePipeline, Feature, MemoryUse};
+use welkin::gpu::{Buffer, BufferKind, ComputePipeline, Feature, Image, ImageDesc, MemoryUse, Once};
 use welkin::shaders::probe_square_comp as square;
 
 fn open() -> Standalone {
@@ -99,4 +100,46 @@ fn an_unknown_device_is_an_error_that_lists_the_devices() {
     let error = Standalone::new(Options { device: Some("Voodoo 2".into()), ..Options::default() }).err().unwrap();
     let text = error.to_string();
     assert!(text.contains("--device") && text.contains("Voodoo 2") && text.contains("0: "), "{text}");
+}
+
+#[test]
+fn a_frame_whose_recording_fails_leaves_no_trace() {
+    let mut device = open();
+    let gpu = device.gpu().clone();
+    let (format, usage) = (ash::vk::Format::R32_SFLOAT, ash::vk::ImageUsageFlags::STORAGE);
+    let image = Image::new(&gpu, &ImageDesc { name: "image", extent: [4, 4, 0], format, usage }).unwrap();
+    let readback = Buffer::new(&gpu, "readback", 64, BufferKind::Readback).unwrap();
+    let failed = device.frames().submit::<()>(|rec| {
+        rec.clear_image(&image, [1.0; 4]);
+        Err(Error::invalid("frame", 1, "another"))
+    });
+    assert!(matches!(failed, Err(Error::InvalidParam { .. })));
+    // The image has never left its undefined layout: the next frame has to bring it to its own.
+    let run = device.frames().run(|rec| {
+        rec.clear_image(&image, [2.0; 4]);
+        rec.copy_image_to_buffer(&image, &readback);
+        rec.make_visible_to_host(&readback);
+        Ok(())
+    });
+    run.unwrap();
+    assert_eq!(readback.read::<f32>(0, 16), [2.0; 16]);
+    assert_eq!(device.messages().unwrap().all(), Vec::<String>::new());
+}
+
+#[test]
+fn what_is_recorded_once_is_recorded_again_after_a_frame_that_was_not_submitted() {
+    let mut device = open();
+    let (once, mut times) = (Once::new(), 0);
+    let mut record = |fails: bool| {
+        let submitted = device.frames().run(|rec| {
+            rec.once(&once, |_| {
+                times += 1;
+                Ok(())
+            })?;
+            if fails { Err(Error::invalid("frame", 1, "another")) } else { Ok(()) }
+        });
+        assert_eq!(submitted.is_err(), fails);
+        times
+    };
+    assert_eq!([true, false, false, true, false].map(&mut record), [1, 2, 2, 2, 2]);
 }

@@ -2,7 +2,7 @@
 
 use super::{Air, CloudShadow, SkyLight};
 use crate::Result;
-use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
+use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Image, ImageDesc, Once, Recorder, Sampler};
 use crate::params::SkyModel;
 use crate::shaders::{
     atmosphere_aerial_comp as aerial, atmosphere_multiple_comp as multiple, atmosphere_sky_light_comp as sky_light,
@@ -33,9 +33,10 @@ assert_layout!(SkyLightPush, sky_light_push, { cloud_altitude: CLOUD_ALTITUDE, s
 /// The tables of one sky, and what fills them.
 pub struct Atmosphere {
     model: SkyModel,
-    filled: bool,
-    /// Camera altitude, sine of the sun's elevation and cloud base that the sky view was filled for.
-    view: Option<[f32; 3]>,
+    /// The tables of the air alone.
+    filled: Once,
+    /// Sky view and aerial perspective, by camera altitude, sine of the sun's elevation and cloud base.
+    view: Once,
     fill_transmittance: ComputePipeline,
     fill_multiple: ComputePipeline,
     fill_sky_view: ComputePipeline,
@@ -79,8 +80,8 @@ impl Atmosphere {
         let model_constant = [("SKY_MODEL", u32::from(model == SkyModel::Atmosphere))];
         Ok(Self {
             model,
-            filled: false,
-            view: None,
+            filled: Once::new(),
+            view: Once::new(),
             fill_transmittance: ComputePipeline::new(gpu, &transmittance::PROGRAM, &[])?,
             fill_multiple: ComputePipeline::new(gpu, &multiple::PROGRAM, &[])?,
             fill_sky_view: ComputePipeline::new(gpu, &sky_view::PROGRAM, &[])?,
@@ -117,7 +118,7 @@ impl Atmosphere {
     /// `shadow` is what the clouds let through to the ground; `cloud_base` is the lowest altitude of the clouds, where
     /// their light is taken \[m\]. With no sky only the light is written.
     pub fn record_luts(
-        &mut self,
+        &self,
         rec: &mut Recorder<'_>,
         frame: &Buffer,
         params: &FrameParams,
@@ -126,43 +127,47 @@ impl Atmosphere {
     ) -> Result<()> {
         let linear = |image| Image::sampled(image, Sampler::LinearClamp);
         rec.pass("atmosphere", |rec| {
-            if self.model == SkyModel::Atmosphere && !self.filled {
-                let [w, h] = TRANSMITTANCE_SIZE;
-                let bindings = transmittance::Bindings { air: &self.air, table: &self.transmittance };
-                rec.dispatch(&self.fill_transmittance, &bindings, &(), [w, h, 1])?;
-                let [w, h] = MULTIPLE_SIZE;
-                let bindings = multiple::Bindings {
-                    air: &self.air,
-                    transmittance_lut: linear(&self.transmittance),
-                    table: &self.multiple,
-                };
-                rec.dispatch(&self.fill_multiple, &bindings, &(), [w, h, 1])?;
-                self.filled = true;
+            if self.model == SkyModel::Atmosphere {
+                rec.once(&self.filled, |rec| {
+                    let [w, h] = TRANSMITTANCE_SIZE;
+                    let bindings = transmittance::Bindings { air: &self.air, table: &self.transmittance };
+                    rec.dispatch(&self.fill_transmittance, &bindings, &(), [w, h, 1])?;
+                    let [w, h] = MULTIPLE_SIZE;
+                    let bindings = multiple::Bindings {
+                        air: &self.air,
+                        transmittance_lut: linear(&self.transmittance),
+                        table: &self.multiple,
+                    };
+                    rec.dispatch(&self.fill_multiple, &bindings, &(), [w, h, 1])?;
+                    Ok(())
+                })?;
             }
             let view = [params.camera[1] + params.origin[1], params.to_sun[1], cloud_base];
-            if self.model == SkyModel::Atmosphere && self.view != Some(view) {
-                self.view = Some(view);
-                let bindings = sky_view::Bindings {
-                    air: &self.air,
-                    frame,
-                    transmittance_lut: linear(&self.transmittance),
-                    multiple_lut: linear(&self.multiple),
-                    smooth_table: &self.sky_view_smooth,
-                    aerosol_table: &self.sky_view_aerosol,
-                    below_smooth_table: &self.below_smooth,
-                    below_aerosol_table: &self.below_aerosol,
-                };
-                rec.dispatch(&self.fill_sky_view, &bindings, &cloud_base, [SKY_VIEW_SIZE[0], SKY_VIEW_SIZE[1], 1])?;
-                let bindings = aerial::Bindings {
-                    air: &self.air,
-                    frame,
-                    transmittance_lut: linear(&self.transmittance),
-                    multiple_lut: linear(&self.multiple),
-                    smooth_table: &self.aerial_smooth,
-                    aerosol_table: &self.aerial_aerosol,
-                    extinction_table: &self.aerial_extinction,
-                };
-                rec.dispatch(&self.fill_aerial, &bindings, &(), [AERIAL_SIZE[0], AERIAL_SIZE[1], 1])?;
+            if self.model == SkyModel::Atmosphere {
+                rec.refresh(&self.view, &view, |rec| {
+                    let bindings = sky_view::Bindings {
+                        air: &self.air,
+                        frame,
+                        transmittance_lut: linear(&self.transmittance),
+                        multiple_lut: linear(&self.multiple),
+                        smooth_table: &self.sky_view_smooth,
+                        aerosol_table: &self.sky_view_aerosol,
+                        below_smooth_table: &self.below_smooth,
+                        below_aerosol_table: &self.below_aerosol,
+                    };
+                    rec.dispatch(&self.fill_sky_view, &bindings, &cloud_base, [SKY_VIEW_SIZE[0], SKY_VIEW_SIZE[1], 1])?;
+                    let bindings = aerial::Bindings {
+                        air: &self.air,
+                        frame,
+                        transmittance_lut: linear(&self.transmittance),
+                        multiple_lut: linear(&self.multiple),
+                        smooth_table: &self.aerial_smooth,
+                        aerosol_table: &self.aerial_aerosol,
+                        extinction_table: &self.aerial_extinction,
+                    };
+                    rec.dispatch(&self.fill_aerial, &bindings, &(), [AERIAL_SIZE[0], AERIAL_SIZE[1], 1])?;
+                    Ok(())
+                })?;
             }
             let bindings = sky_light::Bindings {
                 air: &self.air,

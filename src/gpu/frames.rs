@@ -66,19 +66,29 @@ impl Frames {
         &mut self.state
     }
 
-    /// Waits until the next slot is free, records it with `record` and submits it; returns its slot.
+    /// Waits until the next slot is free, records it with `record` and submits it; returns its slot. When
+    /// recording or submission fails, nothing of the frame remains: what it recorded counts as never recorded.
     pub fn submit<T>(&mut self, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(usize, T)> {
         let slot = (self.submitted % self.commands.len() as u64) as usize;
         if self.submitted >= self.commands.len() as u64 {
             self.wait_for(self.submitted + 1 - self.commands.len() as u64)?;
         }
+        let submitted = self.record_and_submit(slot, record);
+        if submitted.is_err() {
+            self.state.roll_back();
+        }
+        Ok((slot, submitted?))
+    }
+
+    fn record_and_submit<T>(&mut self, slot: usize, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<T> {
         let cmd = self.commands[slot];
         let device = self.gpu.device().clone();
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        self.state.commit();
         // SAFETY: the last submission of this command buffer has ended.
         unsafe { device.begin_command_buffer(cmd, &begin) }
             .map_err(|result| self.gpu.error("vkBeginCommandBuffer", "frame", result))?;
-        // SAFETY: `cmd` records; it is submitted below or thrown away; the slot's last frame has ended.
+        // SAFETY: `cmd` records; it is submitted below or rolled back; the slot's last frame has ended.
         let recorded = record(&mut unsafe { self.state.begin(cmd, slot) });
         // SAFETY: `cmd` is recording.
         let ended = unsafe { device.end_command_buffer(cmd) };
@@ -94,7 +104,7 @@ impl Frames {
         unsafe { device.queue_submit2(self.queue, &[submit], vk::Fence::null()) }
             .map_err(|result| self.lost("vkQueueSubmit2", slot, result))?;
         self.submitted += 1;
-        Ok((slot, value))
+        Ok(value)
     }
 
     /// Waits for everything submitted.

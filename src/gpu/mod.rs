@@ -37,6 +37,6 @@ pub use pipeline::{
 pub use program::{
     Binding, BindingKind, BindingSet, MethodBindings, Program, Resource, ShaderStage, SpecConstant, Stage,
 };
-pub use recorder::{Draw, DrawCall, PassState, Recorder, RecorderState, Target};
+pub use recorder::{Draw, DrawCall, Once, PassState, Recorder, RecorderState, Target};
 pub use sampler::Sampler;
 pub use timing::PassTime;

@@ -82,6 +82,11 @@ impl Timer {
         }
     }
 
+    /// The frame is not submitted: there is nothing to read.
+    pub(crate) fn clear(&mut self) {
+        self.names.clear();
+    }
+
     /// Times of the frame that has ended, passes of one name added up, in order of first appearance.
     pub(crate) fn read(&self) -> Vec<PassTime> {
         let Some(pool) = self.pool else { return Vec::new() };

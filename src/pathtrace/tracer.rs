@@ -495,7 +495,7 @@ fn make_sky(frames: &mut Frames, params: &Params, renderer: &Renderer, frame: &F
     let mut frame = *frame;
     frame.camera[1] = cloud_base.max(1.0) - frame.origin[1];
     let buffer = Buffer::upload(gpu, "sky frame params", &[frame])?;
-    let mut sky = Atmosphere::new(gpu, params.sky.model, &Air::of(&params.sky, &params.sun))?;
+    let sky = Atmosphere::new(gpu, params.sky.model, &Air::of(&params.sky, &params.sun))?;
     frames.run(|rec| sky.record_luts(rec, &buffer, &frame, renderer.sky().shadow(), cloud_base))?;
     // Without a sky nothing has written the tables, which are bound all the same.
     frames.run(|rec| {

@@ -75,7 +75,6 @@ pub struct Brick<'a> {
 pub struct Voxelizer {
     pipeline: ComputePipeline,
     tile: DetailTile,
-    tile_filled: bool,
     particles: Buffer,
     bricks: Buffer,
     lists: Buffer,
@@ -106,7 +105,6 @@ impl Voxelizer {
         Ok(Self {
             pipeline: ComputePipeline::new(gpu, &shader::PROGRAM, &[])?,
             tile: DetailTile::new(gpu)?,
-            tile_filled: false,
             particles: Buffer::upload(gpu, "voxel particles", particles)?,
             bricks: Buffer::new(gpu, "voxel bricks", (BATCH * size_of::<VoxelBrick>()) as u64, BufferKind::Upload)?,
             lists: Buffer::new(gpu, "voxel lists", (BATCH_ENTRIES * size_of::<u32>()) as u64, BufferKind::Upload)?,
@@ -133,10 +131,6 @@ impl Voxelizer {
         let relative = |axis: usize| (grid.corner[axis] - self.gathered.origin[axis]) as f32;
         self.push.corner = std::array::from_fn(relative);
         self.push.edge = grid.voxel as f32;
-        if !self.tile_filled {
-            frames.run(|rec| self.tile.record(rec))?;
-            self.tile_filled = true;
-        }
         let regions = regions(&self.gathered, grid, order);
         let total: f64 = regions.iter().map(Region::weight).sum::<f64>().max(1.0);
         let mut done = 0.0;
@@ -179,6 +173,7 @@ impl Voxelizer {
         self.bricks.write(0, &local);
         self.lists.write(0, list);
         frames.run(|rec| {
+            self.tile.record(rec)?;
             rec.pass("voxelize", |rec| {
                 let bindings = shader::Bindings {
                     particles: &self.particles,

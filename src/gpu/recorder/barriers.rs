@@ -49,7 +49,7 @@ impl Recorder<'_> {
         // One resource may be used in two ways by one command; a write must see all earlier reads, so reads go first.
         for writes in [false, true] {
             for (id, access) in uses.iter().filter(|(_, access)| access.writes() == writes) {
-                self.state.resources.entry(*id).or_default().apply(*access, &mut barrier);
+                self.state.tracked.apply(*id, *access, &mut barrier);
             }
         }
         if !barrier.is_empty() {
@@ -68,7 +68,7 @@ impl Recorder<'_> {
 
     /// Brings a new image to GENERAL layout, once in its life. A lent one comes by `acquire`.
     pub(super) fn initialise(&mut self, image: &Image) {
-        if self.state.initialised.insert(image.id) {
+        if self.state.tracked.set_initialised(image.id, true) {
             assert!(image.owned, "{} is lent: acquire it before a pass uses it", image.name());
             let none = Access::None.masks();
             self.layout(image, none, ALL, vk::ImageLayout::UNDEFINED, vk::ImageLayout::GENERAL);

@@ -2,7 +2,6 @@
 
 use super::Recorder;
 use super::barriers::ALL;
-use crate::gpu::access::ResourceState;
 use crate::gpu::{Access, Image};
 use ash::vk;
 
@@ -19,14 +18,14 @@ impl Recorder<'_> {
     pub fn acquire(&mut self, image: &Image, access: Access, layout: vk::ImageLayout) {
         let (src_stage, src_access) = access.masks();
         self.layout(image, (src_stage, src_access), ALL, layout, vk::ImageLayout::GENERAL);
-        self.state.initialised.insert(image.id);
-        self.state.resources.insert(image.id, ResourceState::default());
+        self.state.tracked.set_initialised(image.id, true);
+        self.state.tracked.reset(image.id);
     }
 
     /// Gives a lent image back, ready for `access` in `layout`.
     pub fn release(&mut self, image: &Image, access: Access, layout: vk::ImageLayout) {
         self.layout(image, ALL, access.masks(), vk::ImageLayout::GENERAL, layout);
-        self.state.initialised.remove(&image.id);
-        self.state.resources.remove(&image.id);
+        self.state.tracked.set_initialised(image.id, false);
+        self.state.tracked.reset(image.id);
     }
 }

@@ -7,10 +7,12 @@ mod check;
 mod descriptors;
 mod dispatch;
 mod draw;
+mod journal;
 mod state;
 mod transfer;
 
 pub use draw::{Draw, DrawCall, PassState, Target};
+pub use journal::Once;
 pub use state::RecorderState;
 
 use super::pipeline::Pipeline;

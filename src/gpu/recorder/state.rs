@@ -2,23 +2,22 @@
 
 use super::Recorder;
 use super::descriptors::DescriptorSets;
+use super::journal::Tracked;
 use crate::Result;
-use crate::gpu::access::ResourceState;
 use crate::gpu::feedback::Framebuffers;
 use crate::gpu::timing::Timer;
 use crate::gpu::{Gpu, PassTime};
 use ash::vk;
-use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// What has to be remembered between frames: the last access of each resource, descriptor sets, timers.
 pub struct RecorderState {
     pub(super) gpu: Arc<Gpu>,
-    pub(super) resources: HashMap<u64, ResourceState>,
-    pub(super) initialised: HashSet<u64>,
+    pub(super) tracked: Tracked,
     pub(super) sets: DescriptorSets,
     pub(super) framebuffers: Framebuffers,
     pub(super) timers: Vec<Timer>,
+    slot: usize,
     pub(super) log: Option<Vec<String>>,
 }
 
@@ -28,11 +27,11 @@ impl RecorderState {
     pub fn new(gpu: &Arc<Gpu>, slots: usize) -> Result<Self> {
         Ok(Self {
             gpu: gpu.clone(),
-            resources: HashMap::new(),
-            initialised: HashSet::new(),
+            tracked: Tracked::default(),
             sets: DescriptorSets::default(),
             framebuffers: Framebuffers::default(),
             timers: (0..slots).map(|_| Timer::new(gpu)).collect::<Result<_>>()?,
+            slot: 0,
             log: None,
         })
     }
@@ -41,17 +40,37 @@ impl RecorderState {
     /// it when the [`Recorder`] is gone. State that the recording changes: bound pipelines and descriptor sets of both bind
     /// points, push constants, viewport and scissor.
     ///
+    /// What is recorded counts as submitted. A host that drops the command buffer instead says so by
+    /// [`roll_back`](Self::roll_back) before it begins another.
+    ///
     /// # Safety
     /// - `cmd` is a primary command buffer in the recording state, outside a render pass, with no query active, and is
-    ///   submitted, once, to a queue of the device's family before what this state records later.
+    ///   submitted, once, to a queue of the device's family before what this state records later, unless it is
+    ///   [rolled back](Self::roll_back).
     /// - The last frame of this slot has ended on the device.
     /// - Buffers, images and pipelines that are recorded stay alive until the frame has ended on the device.
     ///
     /// # Panics
     /// If there is no such slot.
     pub unsafe fn begin(&mut self, cmd: vk::CommandBuffer, slot: usize) -> Recorder<'_> {
+        self.tracked.begin();
+        self.slot = slot;
         self.timers[slot].reset(cmd);
         Recorder { state: self, cmd, slot, pass: "" }
+    }
+
+    /// What was recorded so far stays, whatever becomes of the next recording.
+    pub(crate) fn commit(&mut self) {
+        self.tracked.begin();
+    }
+
+    /// Takes back what was recorded since the last [`begin`](Self::begin): its command buffer is not submitted. Layouts,
+    /// accesses and what is [recorded once](Recorder::once) are again as the device has them.
+    pub fn roll_back(&mut self) {
+        self.tracked.roll_back();
+        if let Some(timer) = self.timers.get_mut(self.slot) {
+            timer.clear();
+        }
     }
 
     /// Time of each pass of the last frame in `slot`, which must have ended; empty without timestamps.
@@ -68,7 +87,7 @@ impl RecorderState {
     /// be done with every frame recorded so far.
     pub fn forget(&mut self) {
         self.sets.clear(&self.gpu);
-        self.resources.clear();
+        self.tracked.forget_accesses();
         self.framebuffers.clear(&self.gpu);
     }
 
