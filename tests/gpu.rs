@@ -143,3 +143,26 @@ fn what_is_recorded_once_is_recorded_again_after_a_frame_that_was_not_submitted(
     };
     assert_eq!([true, false, false, true, false].map(&mut record), [1, 2, 2, 2, 2]);
 }
+
+#[test]
+fn a_buffer_dropped_in_flight_lives_until_its_frame_has_ended_and_its_memory_comes_back() {
+    let mut device = open();
+    let gpu = device.gpu().clone();
+    let before = gpu.memory_use();
+    let slots = device.frames().slots() as u64;
+    for _ in 0..8 {
+        let buffer = Buffer::array::<u32>(&gpu, "short-lived", 1 << 20).unwrap();
+        let submitted = device.frames().submit(|rec| {
+            rec.fill_buffer(&buffer, 0, buffer.size(), 1);
+            Ok(())
+        });
+        submitted.unwrap();
+        drop(buffer);
+        // The frame may still write to it; those of earlier turns of the slots are gone.
+        let kept = gpu.memory_use().allocations - before.allocations;
+        assert!((1..=slots).contains(&kept), "{kept} buffers are kept");
+    }
+    device.frames().wait().unwrap();
+    assert_eq!(gpu.memory_use(), before);
+    assert_eq!(device.messages().unwrap().all(), Vec::<String>::new());
+}

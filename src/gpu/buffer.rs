@@ -3,6 +3,7 @@
 use super::Gpu;
 use super::id::next_id;
 use super::memory::{Allocation, MemoryLocation};
+use super::retire::Garbage;
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -19,7 +20,7 @@ pub enum BufferKind {
     Readback,
 }
 
-/// A buffer with a name, freed when dropped. The device must be done with it by then.
+/// A buffer with a name, freed when dropped, as soon as the frames in flight have ended.
 pub struct Buffer {
     gpu: Arc<Gpu>,
     pub(crate) id: u64,
@@ -129,10 +130,6 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: the caller has made sure that the device is done with the buffer (see the type's documentation).
-        unsafe { self.gpu.device().destroy_buffer(self.handle, None) };
-        if let Some(allocation) = self.allocation.take() {
-            self.gpu.memory().free(allocation);
-        }
+        self.gpu.retire(Garbage::Buffer(self.handle, self.allocation.take()));
     }
 }

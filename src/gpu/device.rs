@@ -2,6 +2,7 @@
 
 use super::memory::{Accounting, Allocator, DefaultAllocator, MemoryUse};
 use super::pipeline::{DefaultFactory, PipelineFactory};
+use super::retire::Retirement;
 use super::{Capabilities, DeviceFeatures, Feature, Sampler};
 use crate::{Error, Result};
 use ash::vk::{self, Handle};
@@ -52,6 +53,7 @@ pub struct Gpu {
     samplers: Vec<vk::Sampler>,
     debug: Option<ash::ext::debug_utils::Device>,
     described: Mutex<Vec<String>>,
+    pub(super) retirement: Retirement,
     keep_alive: Option<Box<dyn Any + Send + Sync>>,
 }
 
@@ -109,6 +111,7 @@ impl Gpu {
             samplers: Vec::new(),
             debug,
             described: Mutex::new(Vec::new()),
+            retirement: Retirement::default(),
             keep_alive: raw.keep_alive,
         };
         if raw.pipeline_cache.is_none() {
@@ -203,6 +206,7 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
+        self.end_all_frames();
         for sampler in &self.samplers {
             // SAFETY: made by this device; every user held an `Arc` of `self` and is gone.
             unsafe { self.device.destroy_sampler(*sampler, None) };

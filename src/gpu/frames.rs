@@ -109,7 +109,9 @@ impl Frames {
 
     /// Waits for everything submitted.
     pub fn wait(&mut self) -> Result<()> {
-        self.wait_for(self.submitted)
+        self.wait_for(self.submitted)?;
+        self.state.end_frames();
+        Ok(())
     }
 
     /// Records, submits and waits.

@@ -3,6 +3,7 @@
 
 use super::id::next_id;
 use super::memory::{Allocation, MemoryLocation};
+use super::retire::Garbage;
 use super::{Gpu, Sampler};
 use crate::Result;
 use ash::vk;
@@ -21,7 +22,7 @@ pub struct ImageDesc<'a> {
     pub usage: vk::ImageUsageFlags,
 }
 
-/// An image with one view, freed when dropped. The device must be done with it by then.
+/// An image with one view, freed when dropped, as soon as the frames in flight have ended.
 pub struct Image {
     gpu: Arc<Gpu>,
     pub(crate) id: u64,
@@ -185,14 +186,7 @@ impl Drop for Image {
         if !self.owned {
             return;
         }
-        // SAFETY: the caller has made sure that the device is done with the image (see the type's documentation).
-        unsafe {
-            self.gpu.device().destroy_image_view(self.view, None);
-            self.gpu.device().destroy_image(self.handle, None);
-        }
-        if let Some(allocation) = self.allocation.take() {
-            self.gpu.memory().free(allocation);
-        }
+        self.gpu.retire(Garbage::Image(self.handle, self.view, self.allocation.take()));
     }
 }
 

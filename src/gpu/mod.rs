@@ -17,6 +17,7 @@ mod memory;
 mod pipeline;
 mod program;
 mod recorder;
+mod retire;
 mod sampler;
 pub mod standalone;
 mod timing;

@@ -1,5 +1,6 @@
 //! Pipelines, first described as data, then built: an engine can print, change, replace or cache each one.
 
+use super::retire::Garbage;
 use super::{BindingKind, Feedback, FeedbackPath, Gpu, Program, ShaderStage, create_render_pass};
 use crate::Result;
 use ash::vk;
@@ -189,7 +190,7 @@ pub struct DefaultFactory;
 
 impl PipelineFactory for DefaultFactory {}
 
-/// A pipeline with its layouts; destroyed when dropped, when the device must be done with it.
+/// A pipeline with its layouts; destroyed when dropped, as soon as the frames in flight have ended.
 pub(crate) struct Pipeline {
     gpu: Arc<Gpu>,
     pub(crate) desc: PipelineDesc,
@@ -247,12 +248,7 @@ impl Pipeline {
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
-        // SAFETY: made by this device; the owner has made sure that the device is done with it. Null handles are ignored.
-        unsafe {
-            self.gpu.device().destroy_pipeline(self.handle, None);
-            self.gpu.device().destroy_pipeline_layout(self.layout, None);
-            self.gpu.device().destroy_descriptor_set_layout(self.set_layout, None);
-        }
+        self.gpu.retire(Garbage::Pipeline(self.handle, self.layout, self.set_layout));
     }
 }
 

@@ -5,6 +5,7 @@ use super::descriptors::DescriptorSets;
 use super::journal::Tracked;
 use crate::Result;
 use crate::gpu::feedback::Framebuffers;
+use crate::gpu::id::next_id;
 use crate::gpu::timing::Timer;
 use crate::gpu::{Gpu, PassTime};
 use ash::vk;
@@ -17,6 +18,7 @@ pub struct RecorderState {
     pub(super) sets: DescriptorSets,
     pub(super) framebuffers: Framebuffers,
     pub(super) timers: Vec<Timer>,
+    id: u64,
     slot: usize,
     pub(super) log: Option<Vec<String>>,
 }
@@ -31,6 +33,7 @@ impl RecorderState {
             sets: DescriptorSets::default(),
             framebuffers: Framebuffers::default(),
             timers: (0..slots).map(|_| Timer::new(gpu)).collect::<Result<_>>()?,
+            id: next_id(),
             slot: 0,
             log: None,
         })
@@ -48,15 +51,22 @@ impl RecorderState {
     ///   submitted, once, to a queue of the device's family before what this state records later, unless it is
     ///   [rolled back](Self::roll_back).
     /// - The last frame of this slot has ended on the device.
-    /// - Buffers, images and pipelines that are recorded stay alive until the frame has ended on the device.
+    /// - Lent images that are recorded, and this state, stay alive until the frame has ended on the device. Buffers, images
+    ///   and pipelines of Welkin's may be dropped any time: they are kept until the frame's slot is begun again.
     ///
     /// # Panics
     /// If there is no such slot.
     pub unsafe fn begin(&mut self, cmd: vk::CommandBuffer, slot: usize) -> Recorder<'_> {
         self.tracked.begin();
         self.slot = slot;
+        self.gpu.begin_frame(self.id, slot);
         self.timers[slot].reset(cmd);
         Recorder { state: self, cmd, slot, pass: "" }
+    }
+
+    /// Every frame recorded so far has ended.
+    pub(crate) fn end_frames(&mut self) {
+        self.gpu.end_frames(self.id);
     }
 
     /// What was recorded so far stays, whatever becomes of the next recording.
@@ -68,6 +78,7 @@ impl RecorderState {
     /// accesses and what is [recorded once](Recorder::once) are again as the device has them.
     pub fn roll_back(&mut self) {
         self.tracked.roll_back();
+        self.gpu.end_frame(self.id, self.slot);
         if let Some(timer) = self.timers.get_mut(self.slot) {
             timer.clear();
         }
@@ -86,6 +97,7 @@ impl RecorderState {
     /// Forgets descriptor sets and states, after resources have been replaced or lent images have gone. The device must
     /// be done with every frame recorded so far.
     pub fn forget(&mut self) {
+        self.end_frames();
         self.sets.clear(&self.gpu);
         self.tracked.forget_accesses();
         self.framebuffers.clear(&self.gpu);
