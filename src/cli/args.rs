@@ -36,6 +36,8 @@ pub enum Command {
     Accuracy(AccuracyArgs),
     /// Try what a driver must do for Welkin, check by check; exit status 1 if a check fails
     Conform(ConformArgs),
+    /// Measure everything about a device within minutes: what scripts/gpu-check starts (docs/performance)
+    GpuCheck(GpuCheckArgs),
 }
 
 #[derive(Args, Debug)]
@@ -232,8 +234,15 @@ pub enum SunArg {
 #[derive(Args, Debug)]
 pub struct BenchArgs {
     /// Scene file
-    #[arg(value_name = "SCENE.toml")]
-    pub scene: PathBuf,
+    #[arg(value_name = "SCENE.toml", required_unless_present_any = ["sort", "cold_tables"])]
+    pub scene: Option<PathBuf>,
+    /// Measure the radix sort instead of a scene: so many random pairs of a 32-bit key and an index
+    #[arg(long, value_name = "N,...", value_delimiter = ',', conflicts_with_all = ["scene", "vs", "vs_set", "blend"],
+          value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
+    pub sort: Vec<u32>,
+    /// Measure how long the tables of the default medium take to make, without any cache
+    #[arg(long, value_name = "SIZE", value_enum, conflicts_with_all = ["scene", "vs", "vs_set", "blend", "sort"])]
+    pub cold_tables: Option<ColdTables>,
     /// Print JSON (docs/json.md)
     #[arg(long)]
     pub json: bool,
@@ -256,6 +265,52 @@ pub struct BenchArgs {
     pub picture: PictureArgs,
 }
 
+/// Which tables `bench --cold-tables` makes.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColdTables {
+    /// Full ones
+    Full,
+    /// Reduced ones, as a first picture uses
+    Reduced,
+}
+
+#[derive(Args, Debug)]
+pub struct GpuCheckArgs {
+    /// What `scripts/gpu-check prepare` has collected, unpacked
+    #[arg(long, value_name = "DIR")]
+    pub kit: PathBuf,
+    /// Directory for DEVICE.json, DEVICE.md and, in DEVICE/, pictures and what each measurement printed; made if need be
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// How much to measure
+    #[arg(long, value_enum, default_value_t)]
+    pub scale: ScaleArg,
+    /// Time for all steps together [s]; what comes too late is left out [default: 360]
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub budget: Option<u64>,
+    /// Where the results of earlier runs lie, to compare with [default: --out]
+    #[arg(long, value_name = "DIR")]
+    pub previous: Option<PathBuf>,
+    /// Device by part of its name or by its index in `welkin devices`
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Make what the kit lacks on the driver in use: tables, and the pictures that devices are compared with
+    #[arg(long, hide = true)]
+    pub fill_kit: bool,
+}
+
+/// How much `gpu-check` measures.
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ScaleArg {
+    /// What a GPU does in six minutes
+    #[default]
+    Full,
+    /// Small pictures and short lists, for a CPU driver
+    Modest,
+    /// As little as shows that every step works
+    Tiny,
+}
+
 #[derive(Args, Debug)]
 pub struct ConformArgs {
     /// Print JSON (docs/json.md)
@@ -276,6 +331,11 @@ pub struct ConformArgs {
     /// Small sizes and few repetitions
     #[arg(long)]
     pub quick: bool,
+    /// Take interlock and attachment-access flags away: each check of ordering must show it, and fails if it does not
+    ///
+    /// For hardware. A software rasterizer keeps a pixel's fragments in order even where nobody asks for it.
+    #[arg(long)]
+    pub unordered: bool,
     /// How long a check may take before it counts as hanging [s]
     #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub timeout: u64,

@@ -10,9 +10,9 @@ use welkin::{Error, Result};
 
 use super::args::{BenchArgs, Versus};
 use super::progress::{Progress, note};
-use super::scenes;
 use super::session::{Device, Session};
 use super::summary::{PassTimes, median, median_bounds, p95};
+use super::{bench_parts, scenes};
 
 #[derive(Serialize)]
 struct Report {
@@ -137,7 +137,8 @@ impl Contender {
 }
 
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let params = scenes::load(&args.scene, &args.picture)?;
+    let Some(scene) = &args.scene else { return bench_parts::run(args) };
+    let params = scenes::load(scene, &args.picture)?;
     let first = scenes::blended(params.clone(), args.blend, "--blend")?;
     let named = args.vs.iter().filter_map(|versus| match versus {
         Versus::Mode(blend) => Some(scenes::blended(params.clone(), Some(*blend), "--vs")),
@@ -147,7 +148,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let replaced = match args.vs_set.as_slice() {
         [] => None,
         values => {
-            let params = scenes::load_replaced(&args.scene, &args.picture, "--vs-set", values)?;
+            let params = scenes::load_replaced(scene, &args.picture, "--vs-set", values)?;
             Some(scenes::blended(params, args.blend, "--blend")?)
         }
     };
@@ -189,7 +190,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         })
         .collect();
     let report = Report {
-        scene: args.scene.display().to_string(),
+        scene: scene.display().to_string(),
         width: args.picture.size.width,
         height: args.picture.size.height,
         device: device.stats(),

@@ -4,8 +4,10 @@ mod ab;
 mod accuracy;
 mod args;
 mod bench;
+mod bench_parts;
 mod conform;
 mod devices;
+mod gpu_check;
 mod interrupt;
 mod places;
 mod precompute;
@@ -59,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Ab(args) => ab::run(args).map(Outcome::of),
         Command::Accuracy(args) => accuracy::run(args).map(Outcome::done),
         Command::Conform(args) => conform::run(args).map(Outcome::of),
+        Command::GpuCheck(args) => gpu_check::run(args),
     };
     let validation = validation::verdict();
     match outcome.and_then(|outcome| validation.map(|()| outcome)) {

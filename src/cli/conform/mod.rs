@@ -7,11 +7,11 @@ mod report;
 mod supervise;
 mod worker;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde::{Deserialize, Serialize};
-use welkin::conform::{self, Check, matches};
+use welkin::conform::{self, Check, Group, Sabotage, matches};
 use welkin::{Error, Result};
 
 use super::args::ConformArgs;
@@ -35,6 +35,7 @@ enum Message {
 pub fn run(args: &ConformArgs) -> Result<bool> {
     let checks: Vec<Check> = conform::checks()
         .into_iter()
+        .filter(|check| !args.unordered || of_order(check))
         .filter(|check| args.filter.is_empty() || args.filter.iter().any(|pattern| matches(pattern, &check.id)))
         .collect();
     if checks.is_empty() {
@@ -75,6 +76,11 @@ pub fn run(args: &ConformArgs) -> Result<bool> {
     Ok(report.devices.iter().all(DeviceReport::green))
 }
 
+/// Whether a check proves order, so that it must show when nobody asks for it.
+fn of_order(check: &Check) -> bool {
+    matches!(check.group, Group::Interlock | Group::Attachment) && check.fails_by.contains(&Sabotage::Unordered)
+}
+
 /// Tries every check on one device.
 fn device(args: &ConformArgs, checks: &[Check], wanted: Option<String>) -> Result<DeviceReport> {
     let label = wanted.as_ref().map_or_else(|| "conform".to_owned(), |name| format!("conform, device {name}"));
@@ -88,6 +94,9 @@ fn device(args: &ConformArgs, checks: &[Check], wanted: Option<String>) -> Resul
         if args.quick {
             command.arg("--quick");
         }
+        if args.unordered {
+            command.arg("--unordered");
+        }
         for pattern in &args.filter {
             command.args(["--filter", pattern]);
         }
@@ -97,18 +106,25 @@ fn device(args: &ConformArgs, checks: &[Check], wanted: Option<String>) -> Resul
 }
 
 /// A command that starts this program again, on the same driver.
-fn myself() -> Command {
-    // On a prefix with a libc of its own the running executable is that libc's loader; the prefix's starter takes the
-    // program's own name (docs/drivers.md).
-    let starter = std::env::var_os("WELKIN_PREFIX").map(|prefix| PathBuf::from(prefix).join("run"));
-    let starter = starter.filter(|starter| starter.exists());
-    match (starter, std::env::args_os().next(), std::env::current_exe()) {
-        (Some(starter), Some(program), _) => {
-            let mut command = Command::new(starter);
-            command.arg(program);
-            command
-        }
+pub(super) fn myself() -> Command {
+    // On a prefix with a libc of its own the running executable is that libc's loader; the program's own name is kept.
+    match (starter(), std::env::args_os().next(), std::env::current_exe()) {
+        (Some(_), Some(program), _) => started(Path::new(&program)),
         (None, _, Ok(program)) => Command::new(program),
         (_, program, _) => Command::new(program.unwrap_or_else(|| "welkin".into())),
     }
+}
+
+/// A command that starts another program of ours, on the same driver.
+pub(super) fn started(program: &Path) -> Command {
+    let Some(starter) = starter() else { return Command::new(program) };
+    let mut command = Command::new(starter);
+    command.arg(program);
+    command
+}
+
+/// What starts programs on the prefix that this one runs on (docs/drivers.md).
+fn starter() -> Option<PathBuf> {
+    let starter = std::env::var_os("WELKIN_PREFIX").map(|prefix| PathBuf::from(prefix).join("run"));
+    starter.filter(|starter| starter.exists())
 }

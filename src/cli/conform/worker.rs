@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use welkin::Result;
-use welkin::conform::{Check, Effort, Lab, LabOptions, Outcome, Verdict};
+use welkin::conform::{Check, Effort, Lab, LabOptions, Outcome, Sabotage, Verdict};
 use welkin::gpu::standalone;
 
 use super::super::args::ConformArgs;
@@ -27,19 +27,32 @@ pub fn run(args: &ConformArgs, checks: &[Check], from: usize) -> Result<()> {
         return Ok(());
     }
     let effort = if args.quick { Effort::Quick } else { Effort::Full };
-    let mut lab = Lab::open(LabOptions { device: Some(index.to_string()), effort, sabotage: None })?;
+    let sabotage = args.unordered.then_some(Sabotage::UnorderedUnseen);
+    let mut lab = Lab::open(LabOptions { device: Some(index.to_string()), effort, sabotage })?;
     device.validation = lab.validated();
     say(&Message::Device(device, devices.len()))?;
     for (index, check) in checks.iter().enumerate().skip(from) {
         say(&Message::Begin(index))?;
-        let outcome = check.run(&mut lab);
+        let mut outcome = check.run(&mut lab);
         let failed = outcome.device_failed;
+        if args.unordered && !failed {
+            outcome.verdict = shown(outcome.verdict);
+        }
         say(&Message::Row(Row::new(check, outcome)))?;
         if failed {
             break; // A failed device is not used again: another process goes on.
         }
     }
     Ok(())
+}
+
+/// The verdict on a check from which ordering was taken away: it passes if it has noticed.
+fn shown(verdict: Verdict) -> Verdict {
+    match verdict {
+        Verdict::Fail { found, .. } => Verdict::Pass(format!("without ordering: {found}")),
+        Verdict::Pass(_) => Verdict::fail("a wrong picture without ordering", "the right one"),
+        skip @ Verdict::Skip(_) => skip,
+    }
 }
 
 fn say(message: &Message) -> Result<()> {
