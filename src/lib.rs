@@ -73,7 +73,7 @@
 //! 3. Each frame: [`gpu::RecorderState::begin`] on the host's command buffer, then
 //!    [`Renderer::record_frame`](renderer::Renderer::record_frame) with [`frame::FrameInputs`] (camera, and the host's opaque
 //!    distances if there are any) and [`frame::FrameOutput`]. Every [`frame::Lent`] image states access and layout on entry
-//!    and on exit. The sun moves by [`Renderer::set_sun`](renderer::Renderer::set_sun).
+//!    and on exit. The sun moves by [`Renderer::set_sun`](renderer::Renderer::set_sun), clouds by [`Renderer::set_time`](renderer::Renderer::set_time).
 //! 4. When a frame has ended, [`Renderer::wants_more`](renderer::Renderer::wants_more) tells whether a list was too small.
 //!
 //! Every pipeline is described as data ([`gpu::PipelineDesc`]) before it is built: `welkin devices --pipelines` prints them

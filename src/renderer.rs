@@ -77,6 +77,14 @@ impl Renderer {
         self.sky.set_sun(position)
     }
 
+    /// Moves the clouds on to `time` [s], from the next frame on: see [`Sky::set_time`].
+    ///
+    /// # Errors
+    /// [`Error::InvalidParam`](crate::Error::InvalidParam) if the time is out of range.
+    pub fn set_time(&mut self, time: f64) -> Result<()> {
+        self.sky.set_time(time)
+    }
+
     /// Records one frame seen by `camera` into the renderer's own images: [`Self::film`], [`Self::targets`].
     pub fn record(&mut self, rec: &mut Recorder<'_>, camera: &Camera, tables: TableImages<'_>) -> Result<()> {
         self.record_frame(rec, &FrameInputs::new(camera, tables), None)

@@ -99,13 +99,18 @@ pub struct FrameParams {
     pub seed: u32,
     /// Time of the frame [s].
     pub time: f32,
-    /// The floating origin in the scene's coordinates [m]: anchors noise to the world.
+    /// The floating origin in the scene's coordinates [m]: anchors the ground to the world.
     pub origin: [f32; 3],
     /// Mean of the density profile over a chord through the middle of a particle.
     pub fill: f32,
+    /// What anchors the detail noise [m]: the origin, less the way that the clouds have come.
+    pub detail_origin: [f32; 3],
+    /// Unused.
+    pub reserved: u32,
 }
 assert_layout!(FrameParams, frame_params, {
     camera: CAMERA, tan_half_fov_y: TAN_HALF_FOV_Y, right: RIGHT, aspect: ASPECT, up: UP, width: WIDTH,
     forward: FORWARD, height: HEIGHT, to_sun: TO_SUN, sigma_t: SIGMA_T, low_width: LOW_WIDTH,
     low_height: LOW_HEIGHT, seed: SEED, time: TIME, origin: ORIGIN, fill: FILL,
+    detail_origin: DETAIL_ORIGIN, reserved: RESERVED_C,
 });

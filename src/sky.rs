@@ -13,7 +13,7 @@ use crate::gpu::{Buffer, BufferKind, Gpu, Image, ImageDesc, Recorder, Resource};
 use crate::grid::{Counters, ParticleSet};
 use crate::lighting::{self, Lent, Method, Scene};
 use crate::lists::ListUse;
-use crate::params::{Camera, Params, SkyModel, Style, Sun, SunPosition};
+use crate::params::{Animation, Camera, Params, SkyModel, Style, Sun, SunPosition};
 use crate::shared::FrameParams;
 use crate::source::{self, ParticleSource, Place};
 use crate::tiling::{Tiling, TilingParams};
@@ -110,6 +110,20 @@ impl Sky {
         Ok(())
     }
 
+    /// Moves the clouds on to `time` [s], from the next frame on: by the wind, the evolution and the velocities that the
+    /// parameters have. What it shows depends on the time alone, which may also go back. The sun and the cameras are the
+    /// host's to move; [`Params::at_frame`] has all three for a scene's animation.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParam`](crate::Error::InvalidParam) if the time is out of range.
+    pub fn set_time(&mut self, time: f64) -> Result<()> {
+        let animation = Animation { time, ..self.params.animation.clone() };
+        animation.validate()?;
+        self.source.set_time(&animation);
+        self.params.animation = animation;
+        Ok(())
+    }
+
     /// Whether the particles of `params` need their tables ([`TableImages`]).
     #[must_use]
     pub fn needs_tables(params: &Params) -> bool {
@@ -143,6 +157,7 @@ impl Sky {
             cells: self.source.cells(),
             place,
             layer: &layer,
+            drift: self.params.animation.clouds().drift,
             to_sun,
             fill,
         };
@@ -253,9 +268,11 @@ impl Sky {
             low_width: low_extent[0],
             low_height: low_extent[1],
             seed: self.params.clouds.seed,
-            time: 0.0,
+            time: self.params.animation.time as f32,
             origin: f32s(now.place.origin),
             fill: now.fill,
+            detail_origin: f32s(self.params.animation.clouds().detail_origin(now.place.origin)),
+            reserved: 0,
         }
     }
 }

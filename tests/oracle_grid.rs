@@ -4,7 +4,7 @@
 mod clouds;
 
 use clouds::{Setup, Stages, open, read, silent};
-use welkin::params::{Coverage, CoverageMap};
+use welkin::params::{Animation, Coverage, CoverageMap};
 use welkin::reference::grid;
 use welkin::shared::Particle;
 
@@ -67,6 +67,65 @@ fn a_coverage_image_is_sampled_alike_and_repeats() {
     let mut setup = Setup { camera: [0.0, 500.0, 0.0], origin: [0.0; 3], ..Setup::default() };
     setup.clouds.coverage = Coverage::Map(map);
     compare(&setup, &values);
+}
+
+/// A sheared wind and clouds that grow, at `time`.
+fn in_motion(time: f64) -> Setup {
+    let wind = vec![[4.0, -1.0], [9.0, 2.0], [11.0, 6.0]];
+    Setup { animation: Animation { wind, evolution: 1.0 / 600.0, time, ..Animation::default() }, ..Setup::default() }
+}
+
+#[test]
+fn clouds_in_wind_and_evolution_are_those_of_the_reference_at_any_time() {
+    compare(&in_motion(0.0), &[]);
+    compare(&in_motion(1234.5), &[]);
+}
+
+#[test]
+fn clouds_in_pure_wind_are_those_that_a_camera_sees_moving_the_other_way() {
+    // 1024 m: a step of the floating origin, hence the same floats.
+    let (wind, time) = (vec![[10.24, -20.48]], 100.0);
+    let mut windy = Setup::default();
+    windy.animation = Animation { wind, time, ..Animation::default() };
+    let still = Setup::default();
+    let away = |p: [f64; 3]| [p[0] - 1024.0, p[1], p[2] + 2048.0];
+    let moved = Setup { camera: away(still.camera), origin: away(still.origin), ..Setup::default() };
+    assert_eq!(windy.grid_params().ring_first, moved.grid_params().ring_first);
+    let (windy, moved) = (grid::generate(&windy.grid_params(), &[]), grid::generate(&moved.grid_params(), &[]));
+    assert_eq!(windy.cell_and_layer, moved.cell_and_layer);
+    for (a, b) in windy.particles.iter().zip(&moved.particles) {
+        assert_eq!(a.id, b.id);
+        assert_eq!((a.semi_axes, a.rotation, a.density), (b.semi_axes, b.rotation, b.density));
+        // The corners of rings differ by an f32 rounding of 6e4 m, and so do fades, by 4 mm in four cells.
+        assert!((0..3).all(|i| (a.centre[i] - b.centre[i]).abs() < 0.02) && (a.fade - b.fade).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn nothing_pops_while_clouds_drift_and_grow() {
+    let at = |time: f64| {
+        let grid = grid::generate(&in_motion(time).grid_params(), &[]);
+        let strength = |p: &Particle| p.fade * p.density;
+        grid.particles.iter().map(|p| (p.id, (strength(p), *p))).collect::<std::collections::HashMap<_, _>>()
+    };
+    for start in [0.0, 700.0] {
+        // A frame of 60 Hz: 3e-5 lives, in which the field changes by less than 3e-4 (src/reference/density.rs has 0.015 in
+        // 1e-3 lives), an appearing column by 20 times 1.5 of that, and a layer's fade by a tenth of it at most.
+        let (before, after) = (at(start), at(start + 1.0 / 60.0));
+        assert!(before.len() > 10_000);
+        for (id, (strength, particle)) in &before {
+            let (later, other) = after.get(id).map_or((0.0, *particle), |(later, other)| (*later, *other));
+            assert!((strength - later).abs() < 0.02, "{id}: {strength} {later}\n{particle:?}\n{other:?}");
+            if *strength > 0.02 {
+                let size = particle.semi_axes.iter().zip(other.semi_axes).map(|(a, b)| (a - b).abs() / a);
+                assert!(size.fold(0.0f32, f32::max) < 0.02, "{particle:?}\n{other:?}");
+                let way = (0..3).map(|i| (particle.centre[i] - other.centre[i]).abs()).fold(0.0f32, f32::max);
+                assert!(way < 3.0, "{way} m\n{particle:?}\n{other:?}"); // 0.2 m of wind; the rest is growth
+            }
+        }
+        let born = after.iter().filter(|(id, _)| !before.contains_key(id));
+        assert!(born.map(|(_, (strength, _))| *strength).fold(0.0f32, f32::max) < 0.02);
+    }
 }
 
 #[test]

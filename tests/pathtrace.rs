@@ -61,6 +61,7 @@ fn heap(count: u32) -> Vec<ParticleDesc> {
                 rotation: q.map(|c| c / length),
                 density: 0.1 + r(),
                 colour: [r(), r(), r()],
+                ..ParticleDesc::default()
             }
         })
         .collect()

@@ -26,7 +26,7 @@ Segment particle_segment(uint index, vec2 pixel) {
         // silhouette does (glsl/density/extinction.glsl has the body that this draws).
         float in_front = sqrt(max(DETAIL_BALL * DETAIL_BALL - ray.b2, 0.0));
         vec3 facing = normalize(ray.closest - in_front * ray.dir_us);
-        vec3 position = p.centre + rotate(p.rotation, facing * p.semi_axes) + f.origin;
+        vec3 position = p.centre + rotate(p.rotation, facing * p.semi_axes) + f.detail_origin;
         float size = min(p.semi_axes.x, min(p.semi_axes.y, p.semi_axes.z));
         float t_surface = ray.t_closest - in_front * ray.metres;
         float footprint = max(t_surface, 0.0) * 2.0 * f.tan_half_fov_y / float(f.low_height);

@@ -17,8 +17,10 @@ struct FrameParams {
     uint  low_height;
     uint  seed;
     float time;             // [s]
-    vec3  origin;           // the floating origin in the scene's coordinates [m]: anchors noise to the world
+    vec3  origin;           // the floating origin in the scene's coordinates [m]: anchors the ground to the world
     float fill;             // mean of the density profile over a chord through the middle [1]
+    vec3  detail_origin;    // what anchors the detail noise: the origin, less the way that the clouds have come [m]
+    uint  reserved_c;
 };
 
 // Unit ray through `pixel` (texel units, centre of the first pixel at 0.5) of an image of `size`; row 0 is the top.

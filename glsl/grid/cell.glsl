@@ -86,8 +86,10 @@ float coverage_threshold(float coverage, in GridParams p) {
     return result;
 }
 
-// Layer that carries a puff with hash `id`.
-uint puff_host(uint id, CellShape shape) {
+// Layer that carries a puff with hash `id`. Of columns that grow, one that does not depend on their height (`p.evolving`),
+// or the top one while it is not there yet: puff_fade() hides the puff until then.
+uint puff_host(uint id, CellShape shape, uint ring, in GridParams p) {
+    if (p.evolving != 0u) return min(id % uint(p.ring_first[ring].z), shape.layers - 1u);
     return shape.body < 1.0 ? id % shape.layers : shape.layers - 1u;
 }
 
@@ -147,6 +149,14 @@ CellShape cell_shape(CellPlace place, float coverage, in GridParams p) {
         shape.height = lower;
         shape.body = softer;
         shape.weight = max(shape.weight, core);
+        if (!(shape.weight > 0.0)) { shape.layers = 0u; shape.puffs = 0u; }
+    }
+    if (p.evolving != 0u && shape.layers > 0u) {
+        // A column that comes into being fades in; its layers are those of the height that it has in the end.
+        precise float appear = excess * 20.0;
+        shape.weight = shape.weight * smooth_unit(appear);
+        precise float steps_now = shape.height * p.ring_layer[place.ring].y;
+        shape.layers = uint(clamp(int(ceil(steps_now)), 1, p.ring_first[place.ring].z));
         if (!(shape.weight > 0.0)) { shape.layers = 0u; shape.puffs = 0u; }
     }
     return shape;

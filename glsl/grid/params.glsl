@@ -11,6 +11,7 @@ struct GridParams {
     vec4 ring_frame[RING_CAPACITY];  // xy: corner of that cell [m, floating origin]; z: cell edge [m]; w: 1 / edge
     vec4 ring_layer[RING_CAPACITY];  // x: layer step [m]; y: 1 / step; z: share of fine detail that cells resolve; w: unused
     vec4 threshold[17];              // field value above which a share i/64 of the world lies, four to a vector
+    vec4 lean[4];                    // how far columns lean at even heights from base to top, x and z, two to a vector [m]
     vec3 camera;                     // camera [m, floating origin]
     float altitude;                  // cloud base above sea level [m]
     float thickness;                 // highest column [m]
@@ -33,11 +34,15 @@ struct GridParams {
     uint particle_capacity;
     uint valid_cell_capacity;
     float density;                   // relative density of a full particle [1]
+    uint phase;                      // of the noises, 2^-24 lives: density/field.glsl
+    uint weather_phase;
+    uint evolving;                   // 1: columns grow and dissolve, and so must without a jump
+    uint lean_count;                 // heights that have a lean; 0: upright
 };
 
 FieldFrequencies field_frequencies(GridParams p) {
     return FieldFrequencies(p.frequency_heap, p.frequency_billow, p.frequency_turret, p.frequency_streak,
-                            p.frequency_region);
+                            p.frequency_region, p.phase, p.weather_phase);
 }
 
 #endif

@@ -14,6 +14,26 @@ float base_height(vec2 from_camera, in GridParams p) {
     return p.altitude - dot(from_camera, from_camera) * p.inverse_diameter;
 }
 
+// Steps of the ring's layers that a column reaches.
+float column_steps(CellPlace place, CellShape shape, in GridParams p) {
+    return shape.height * p.ring_layer[place.ring].y;
+}
+
+// How far a column leans at a share `up` of the layer's thickness [m].
+vec2 column_lean(float up, in GridParams p) {
+    if (p.lean_count < 2u) return vec2(0.0);
+    float knots = clamp(up, 0.0, 1.0) * float(p.lean_count - 1u);
+    uint knot = min(uint(knots), p.lean_count - 2u);
+    vec4 a = p.lean[knot >> 1u], b = p.lean[(knot + 1u) >> 1u];
+    return mix((knot & 1u) == 0u ? a.xy : a.zw, (knot & 1u) == 0u ? b.zw : b.xy, knots - float(knot));
+}
+
+// Of a column that grows, the top layer fades in as the column reaches it.
+float layer_fade(CellPlace place, CellShape shape, uint layer, in GridParams p) {
+    if (p.evolving == 0u || layer == 0u || layer + 1u < shape.layers) return 1.0;
+    return clamp(column_steps(place, shape, p) - float(layer), 0.0, 1.0);
+}
+
 // A column's ball before it is turned: centre, and its half sizes across and upwards.
 struct Ball {
     vec3 centre;
@@ -33,6 +53,10 @@ Ball column_ball(CellPlace place, CellShape shape, uint layer, in GridParams p) 
     float edge = p.ring_frame[place.ring].z;
     float step = shape.height / float(shape.layers);
     float up = (float(layer) + 0.5) / float(shape.layers);
+    if (p.evolving != 0u) { // layers keep their places while others come and go above them
+        if (shape.layers > 1u) step = p.ring_layer[place.ring].x;
+        up = min((float(layer) + 0.5) / max(column_steps(place, shape, p), 1.0), 1.0);
+    }
 
     // Narrow tops, wide bottoms; small at the outline, and a few much larger than the others: billows of many sizes.
     // Neighbours overlap deeply, or the detail noise would open gaps between them.
@@ -51,16 +75,33 @@ Ball column_ball(CellPlace place, CellShape shape, uint layer, in GridParams p) 
     float jitter = layer == 0u ? 0.03 : 0.15;
     float up_metres = layer == 0u ? max(0.5 * step, 0.8 * tall) : (float(layer) + 0.5) * step;
     vec2 xz = place.centre + vec2(signed_float(h2), signed_float(h3)) * (0.4 * edge);
-    float y = base_height(xz - p.camera.xz, p) + up_metres + signed_float(h4) * jitter * 2.0 * tall;
+    float rise = up_metres + signed_float(h4) * jitter * 2.0 * tall;
+    xz += column_lean(rise / p.thickness, p);
+    float y = base_height(xz - p.camera.xz, p) + rise;
     ball.centre = vec3(xz.x, y, xz.y);
     return ball;
 }
 
+// Identity of the column's particle `index`: of puffs of columns that grow, one that does not depend on the layers.
+uint column_id(CellPlace place, CellShape shape, uint index, in GridParams p) {
+    if (p.evolving != 0u && index >= shape.layers) index += 24u - shape.layers; // LAYER_CAPACITY
+    return pcg(hash_lattice(place.absolute, p.seed + 16u + place.ring) + index * 0x9e3779b9u);
+}
+
+// Puffs of columns that grow come and go with their host, and with the outline that has more of them.
+float puff_fade(CellPlace place, CellShape shape, uint index, uint id, in GridParams p) {
+    if (p.evolving == 0u) return 1.0;
+    uint host = id % uint(p.ring_first[place.ring].z);
+    if (host >= shape.layers) return 0.0;
+    bool stays = index == shape.layers && (hash_lattice(place.absolute, p.seed + 15u) & 1u) == 1u;
+    return layer_fade(place, shape, host, p) * (stays ? 1.0 : 1.0 - shape.body);
+}
+
 // A billow on the upper side of one of the column's balls: the top one well inside the cloud, any at the outline.
 Ball puff_ball(CellPlace place, CellShape shape, uint index, in GridParams p) {
-    uint id = pcg(hash_lattice(place.absolute, p.seed + 16u + place.ring) + index * 0x9e3779b9u);
+    uint id = column_id(place, shape, index, p);
     uint h0 = pcg(id), h1 = pcg(h0), h2 = pcg(h1), h3 = pcg(h2);
-    Ball host = column_ball(place, shape, puff_host(id, shape), p);
+    Ball host = column_ball(place, shape, puff_host(id, shape, place.ring, p), p);
     vec3 side = normalize(vec3(signed_float(h0), 0.15 + unit_float(h1), signed_float(h2)));
     Ball ball;
     ball.id = id;
@@ -101,7 +142,8 @@ Particle column_particle(CellPlace place, CellShape shape, uint index, in GridPa
     particle.density = p.density * (0.1 + 0.9 * shape.body * (0.4 + 0.6 * shape.body));
     particle.rotation = rotation;
     particle.semi_axes = semi_axes;
-    particle.fade = shape.weight;
+    float fade = puff ? puff_fade(place, shape, index, ball.id, p) : layer_fade(place, shape, index, p);
+    particle.fade = shape.weight * fade;
     particle.colour = vec3(1.0);
     particle.id = ball.id;
     return particle;

@@ -270,7 +270,7 @@ float profile_at(Particle p, vec3 x) {
     // The finest thing that the renderer shows there at full resolution.
     float far = distance(p.centre + rotate(p.rotation, n * p.semi_axes), view.camera);
     float footprint = max(far * 2.0 * view.tan_half_fov_y / float(view.height), 1e-3);
-    float radius = displaced_radius(p, n, view.origin, detail_tile, medium.detail, footprint);
+    float radius = displaced_radius(p, n, view.detail_origin, detail_tile, medium.detail, footprint);
     return r2 < radius * radius ? textureLod(profile_volume, p_us * (0.5 / radius) + 0.5, 0.0).x : 0.0;
 }
 

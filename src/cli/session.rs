@@ -160,6 +160,8 @@ impl Session {
     /// Renders a frame, again where a list was too small; its slot and times.
     fn run(&mut self, device: &mut Device, params: &Params, read: bool) -> Result<(usize, Times)> {
         let started = Instant::now();
+        self.renderer.set_time(params.animation.time)?;
+        self.renderer.set_sun(params.sun.position)?;
         let frames = device.0.frames();
         let gpu = frames.gpu().clone();
         if let Some(set) = &mut self.tables {

@@ -43,6 +43,8 @@ impl Wavelengths {
             turret: frequency(self.turret, step),
             streak: frequency(self.streak, step),
             region: frequency(self.region, step),
+            phase: 0,
+            weather_phase: 0,
         }
     }
 }

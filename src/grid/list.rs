@@ -19,6 +19,8 @@ fn groups_for(count: u32, per_group: u32) -> [u32; 4] {
 /// Uploads an explicit list, relative to the floating origin of each frame.
 pub struct ParticleList {
     particles: Vec<ParticleDesc>,
+    /// How long the particles have moved [s], and the wind that has carried them [m/s].
+    moved: (f64, [f64; 2]),
     staging: Vec<Staging>,
     no_cells: Buffer,
 }
@@ -28,8 +30,8 @@ struct Staging {
     particles: Buffer,
     counters: Buffer,
     args: Buffer,
-    /// Origin that `particles` was written for.
-    origin: Option<[f64; 3]>,
+    /// Origin and motion that `particles` was written for.
+    written: Option<([f64; 3], (f64, [f64; 2]))>,
 }
 
 impl ParticleList {
@@ -45,12 +47,21 @@ impl ParticleList {
                     particles: Buffer::new(gpu, "particle upload", bytes, BufferKind::Upload)?,
                     counters: Buffer::upload(gpu, "counters upload", &[counters])?,
                     args: Buffer::upload(gpu, "args upload", &args)?,
-                    origin: None,
+                    written: None,
                 })
             })
             .collect::<Result<_>>()?;
         let no_cells = Buffer::upload(gpu, "no cells", &vec![u32::MAX; particles.len().max(1)])?;
-        Ok(Self { particles: particles.to_vec(), staging, no_cells })
+        Ok(Self { particles: particles.to_vec(), moved: (0.0, [0.0; 2]), staging, no_cells })
+    }
+
+    /// From now on particles are where they have come to in `seconds` by their velocities and the wind x, z [m/s].
+    pub fn set_motion(&mut self, seconds: f64, wind: [f64; 2]) {
+        self.moved = (seconds, wind);
+    }
+
+    fn centre(&self, particle: &ParticleDesc) -> [f64; 3] {
+        particle.after(self.moved.0, self.moved.1)
     }
 
     /// Particles in the list: the capacity that its [`ParticleSet`] needs.
@@ -72,7 +83,7 @@ impl ParticleList {
         for particle in &self.particles {
             let reach = f64::from(particle.radii.iter().fold(0.0f32, |a, &b| a.max(b)));
             let [least, greatest] = &mut bounds;
-            for ((least, greatest), centre) in least.iter_mut().zip(greatest).zip(particle.centre) {
+            for ((least, greatest), centre) in least.iter_mut().zip(greatest).zip(self.centre(particle)) {
                 *least = least.min(centre - reach);
                 *greatest = greatest.max(centre + reach);
             }
@@ -84,8 +95,9 @@ impl ParticleList {
     #[must_use]
     pub fn particle(&self, index: usize, origin: [f64; 3]) -> Particle {
         let p = &self.particles[index];
+        let centre = self.centre(p);
         Particle {
-            centre: std::array::from_fn(|axis| (p.centre[axis] - origin[axis]) as f32),
+            centre: std::array::from_fn(|axis| (centre[axis] - origin[axis]) as f32),
             density: p.density,
             rotation: p.rotation,
             semi_axes: p.radii,
@@ -95,14 +107,14 @@ impl ParticleList {
         }
     }
 
-    /// Records the upload into `set`. Particles are rewritten only when the origin has moved.
+    /// Records the upload into `set`. Particles are rewritten only when they or the origin have moved.
     pub fn record(&mut self, rec: &mut Recorder<'_>, origin: [f64; 3], set: &ParticleSet) -> Result<()> {
         assert!(set.capacity() >= self.count(), "the particle set is smaller than the list");
         let slot = rec.slot();
-        if self.staging[slot].origin != Some(origin) {
+        if self.staging[slot].written != Some((origin, self.moved)) {
             let relative: Vec<Particle> = (0..self.particles.len()).map(|i| self.particle(i, origin)).collect();
             self.staging[slot].particles.write(0, &relative);
-            self.staging[slot].origin = Some(origin);
+            self.staging[slot].written = Some((origin, self.moved));
         }
         let staging = &self.staging[slot];
         rec.copy_buffer(&staging.counters, set.counters(), staging.counters.size());

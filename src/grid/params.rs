@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::density::{self, Wavelengths};
-use crate::params::{Clouds, Coverage, Quality};
+use crate::params::{Animation, CloudMotion, Clouds, Coverage, Quality, WIND_LAYERS};
 use crate::reference::density::FieldFrequencies;
 use crate::shared::assert_layout;
 
@@ -28,6 +28,8 @@ pub struct GridParams {
     pub ring_layer: [[f32; 4]; RING_CAPACITY],
     /// Field value above which a share i/64 of the world lies.
     pub threshold: [[f32; 4]; 17],
+    /// How far columns lean at even heights from base to top, x and z, two to a vector [m].
+    pub lean: [[f32; 4]; 4],
     /// Camera [m, floating origin].
     pub camera: [f32; 3],
     /// Cloud base above sea level [m].
@@ -72,17 +74,25 @@ pub struct GridParams {
     pub valid_cell_capacity: u32,
     /// Relative density of a full particle.
     pub density: f32,
+    /// Phase of the noises, 2⁻²⁴ lives: [`FieldFrequencies::phase`].
+    pub phase: u32,
+    /// The same of streaks and weather.
+    pub weather_phase: u32,
+    /// 1: columns grow and dissolve, and do so without a jump.
+    pub evolving: u32,
+    /// Heights that have a lean; 0: upright.
+    pub lean_count: u32,
 }
 
 assert_layout!(GridParams, grid_params, {
-    ring_first: RING_FIRST, ring_frame: RING_FRAME, ring_layer: RING_LAYER, threshold: THRESHOLD, camera: CAMERA,
+    ring_first: RING_FIRST, ring_frame: RING_FRAME, ring_layer: RING_LAYER, threshold: THRESHOLD, lean: LEAN, camera: CAMERA,
     altitude: ALTITUDE, thickness: THICKNESS, inverse_cutoff_squared: INVERSE_CUTOFF_SQUARED,
     inverse_diameter: INVERSE_DIAMETER, coverage: COVERAGE, frequency_heap: FREQUENCY_HEAP,
     frequency_billow: FREQUENCY_BILLOW, frequency_turret: FREQUENCY_TURRET, frequency_streak: FREQUENCY_STREAK,
     frequency_region: FREQUENCY_REGION, frequency_map: FREQUENCY_MAP, map_first_x: MAP_FIRST_X,
     map_first_z: MAP_FIRST_Z, map_width: MAP_WIDTH, map_height: MAP_HEIGHT, ring_count: RING_COUNT,
     ring_dim: RING_DIM, seed: SEED, particle_capacity: PARTICLE_CAPACITY, valid_cell_capacity: VALID_CELL_CAPACITY,
-    density: DENSITY,
+    density: DENSITY, phase: PHASE, weather_phase: WEATHER_PHASE, evolving: EVOLVING, lean_count: LEAN_COUNT,
 });
 
 impl GridParams {
@@ -95,6 +105,8 @@ impl GridParams {
             turret: self.frequency_turret,
             streak: self.frequency_streak,
             region: self.frequency_region,
+            phase: self.phase,
+            weather_phase: self.weather_phase,
         }
     }
 
@@ -111,6 +123,8 @@ pub struct GridDesign {
     fixed: GridParams,
     /// Edge of a ring-0 cell [m].
     cell_edge: f64,
+    /// How far a column leans at most, per axis [m].
+    greatest_lean: f64,
 }
 
 /// Position steps per edge of a ring-0 cell: 1.4 m for the medium preset. Even, so that a cell's centre is a step.
@@ -163,7 +177,20 @@ impl GridDesign {
         fixed.ring_dim = quality.cells;
         fixed.seed = clouds.seed;
         fixed.density = 1.0;
-        Self { fixed, cell_edge }
+        Self { fixed, cell_edge, greatest_lean: 0.0 }
+    }
+
+    /// The same with columns that lean in the shear of `animation`'s wind.
+    #[must_use]
+    pub fn leaning(mut self, animation: &Animation) -> Self {
+        let lean = animation.lean();
+        self.fixed.lean_count = lean.len().min(WIND_LAYERS) as u32;
+        for (at, lean) in lean.iter().take(WIND_LAYERS).enumerate() {
+            self.fixed.lean[at / 2][at % 2 * 2] = lean[0] as f32;
+            self.fixed.lean[at / 2][at % 2 * 2 + 1] = lean[1] as f32;
+            self.greatest_lean = self.greatest_lean.max(lean[0].abs()).max(lean[1].abs());
+        }
+        self
     }
 
     /// Edge of a cell of the innermost ring [m].
@@ -205,7 +232,9 @@ impl GridDesign {
     pub fn level_half_widths(&self) -> Vec<f64> {
         // Cells start up to one away from centred, and jitter moves a particle 0.4 cells.
         let cells = f64::from(self.fixed.ring_dim / 2) + 0.5;
-        (0..self.fixed.ring_count).map(|ring| cells * self.cell_edge * f64::from(1u32 << ring)).collect()
+        (0..self.fixed.ring_count)
+            .map(|ring| cells * self.cell_edge * f64::from(1u32 << ring) + self.greatest_lean)
+            .collect()
     }
 
     /// No particle reaches farther from its centre than this [m].
@@ -223,14 +252,24 @@ impl GridDesign {
     /// [`Grid::record`]: super::Grid::record
     #[must_use]
     pub fn frame(&self, camera: [f64; 3], origin: [f64; 3]) -> GridParams {
+        self.frame_at(camera, origin, &CloudMotion::default())
+    }
+
+    /// The same for clouds that have come as far as `motion`. The wind carries the cells along, so that what drifts is what
+    /// a camera sees that moves the other way: no cell is classified anew, and none can pop.
+    #[must_use]
+    pub fn frame_at(&self, camera: [f64; 3], origin: [f64; 3], motion: &CloudMotion) -> GridParams {
         let mut params = self.fixed;
+        (params.phase, params.weather_phase) = (motion.phase(), motion.weather_phase());
+        params.evolving = u32::from(motion.evolving);
+        let [drift_x, drift_z] = motion.drift;
         let half = f64::from(params.ring_dim / 2);
         for ring in 0..params.ring_count as usize {
             let edge = self.cell_edge * f64::from(1u32 << ring);
-            let first = [camera[0], camera[2]].map(|axis| (axis / edge).floor() - half);
+            let first = [camera[0] - drift_x, camera[2] - drift_z].map(|axis| (axis / edge).floor() - half);
             params.ring_first[ring][0] = first[0] as i32;
             params.ring_first[ring][1] = first[1] as i32;
-            let corner = [first[0] * edge - origin[0], first[1] * edge - origin[2]];
+            let corner = [first[0] * edge - (origin[0] - drift_x), first[1] * edge - (origin[2] - drift_z)];
             params.ring_frame[ring] = [corner[0] as f32, corner[1] as f32, edge as f32, (1.0 / edge) as f32];
         }
         params.camera = [0, 1, 2].map(|axis| (camera[axis] - origin[axis]) as f32);

@@ -42,6 +42,8 @@ pub(crate) struct Scene<'a> {
     pub cells: Option<&'a Grid>,
     pub place: &'a Place,
     pub layer: &'a Layer,
+    /// How far the wind has carried the particles, x and z [m].
+    pub drift: [f64; 2],
     /// Unit direction towards the sun.
     pub to_sun: [f64; 3],
     /// Mean density of a particle along a chord through its centre.

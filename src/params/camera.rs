@@ -1,4 +1,4 @@
-//! The pinhole camera and its motion.
+//! The pinhole camera.
 
 use super::check;
 use crate::{Error, Result};
@@ -71,7 +71,7 @@ impl Camera {
     }
 
     /// Yaw and pitch [radians], whichever way the aim is given.
-    fn yaw_pitch(&self) -> (f64, f64) {
+    pub(super) fn yaw_pitch(&self) -> (f64, f64) {
         match self.aim {
             Aim::Angles { yaw, pitch } => (yaw.to_radians(), pitch.to_radians()),
             Aim::LookAt(target) => {
@@ -88,61 +88,29 @@ impl Camera {
     /// # Errors
     /// Names the field, the value and what is accepted.
     pub fn validate(&self) -> Result<()> {
+        self.validate_as("camera")
+    }
+
+    /// As [`Self::validate`], for the camera that errors call `name`.
+    pub(super) fn validate_as(&self, name: &str) -> Result<()> {
+        let field = |key: &str| format!("{name}.{key}");
         let coordinates = -check::MAX_COORDINATE..=check::MAX_COORDINATE;
-        check::each_within("camera.position", self.position, coordinates.clone(), "m")?;
+        check::each_within(&field("position"), self.position, coordinates.clone(), "m")?;
         match self.aim {
             Aim::Angles { yaw, pitch } => {
-                check::within("camera.yaw", yaw, -1.0e6..=1.0e6, "degrees")?;
-                check::within("camera.pitch", pitch, -90.0..=90.0, "degrees")?;
+                check::within(&field("yaw"), yaw, -1.0e6..=1.0e6, "degrees")?;
+                check::within(&field("pitch"), pitch, -90.0..=90.0, "degrees")?;
             }
             Aim::LookAt(target) => {
-                check::each_within("camera.look_at", target, coordinates, "m")?;
+                check::each_within(&field("look_at"), target, coordinates, "m")?;
                 let away = (0..3).map(|i| (target[i] - self.position[i]).abs()).fold(0.0, f64::max);
                 if away < 1.0e-6 {
-                    let expected = "a point other than camera.position";
-                    return Err(Error::invalid("camera.look_at", format!("{target:?}"), expected));
+                    let expected = format!("a point other than {name}.position");
+                    return Err(Error::invalid(field("look_at"), format!("{target:?}"), expected));
                 }
             }
         }
-        check::within("camera.fov_y", self.fov_y, 0.1..=170.0, "degrees")
-    }
-}
-
-/// What changes per frame of a sequence. All zero by default: every frame is the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Animation {
-    /// Motion of the camera [m per frame]. With [`Aim::LookAt`] the target stays where it is.
-    pub velocity: [f64; 3],
-    /// Turn of the camera towards the east [degrees per frame]. Only for an aim by angles.
-    pub yaw_rate: f64,
-    /// Turn of the camera upwards [degrees per frame], stopping at the zenith. Only for an aim by angles.
-    pub pitch_rate: f64,
-}
-
-impl Animation {
-    /// `camera` after `frame` frames.
-    #[must_use]
-    pub fn camera_at(&self, camera: &Camera, frame: u32) -> Camera {
-        let frames = f64::from(frame);
-        let aim = match camera.aim {
-            Aim::Angles { yaw, pitch } => Aim::Angles {
-                yaw: yaw + self.yaw_rate * frames,
-                pitch: (pitch + self.pitch_rate * frames).clamp(-90.0, 90.0),
-            },
-            target => target,
-        };
-        let position = std::array::from_fn(|i| camera.position[i] + self.velocity[i] * frames);
-        Camera { position, aim, ..*camera }
-    }
-
-    /// Checks every field.
-    ///
-    /// # Errors
-    /// Names the field, the value and what is accepted.
-    pub fn validate(&self) -> Result<()> {
-        check::each_within("animation.velocity", self.velocity, -1.0e5..=1.0e5, "m per frame")?;
-        check::within("animation.yaw_rate", self.yaw_rate, -360.0..=360.0, "degrees per frame")?;
-        check::within("animation.pitch_rate", self.pitch_rate, -360.0..=360.0, "degrees per frame")
+        check::within(&field("fov_y"), self.fov_y, 0.1..=170.0, "degrees")
     }
 }
 

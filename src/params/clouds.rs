@@ -77,11 +77,20 @@ pub struct ParticleDesc {
     pub density: f32,
     /// Radiance of the particle's own light as [`Lighting::Flat`] takes it: a thick particle shows exactly this.
     pub colour: [f32; 3],
+    /// Motion of its own, besides the wind [m/s].
+    pub velocity: [f64; 3],
 }
 
 impl Default for ParticleDesc {
     fn default() -> Self {
-        Self { centre: [0.0; 3], radii: [100.0; 3], rotation: [0.0, 0.0, 0.0, 1.0], density: 1.0, colour: [1.0; 3] }
+        Self {
+            centre: [0.0; 3],
+            radii: [100.0; 3],
+            rotation: [0.0, 0.0, 0.0, 1.0],
+            density: 1.0,
+            colour: [1.0; 3],
+            velocity: [0.0; 3],
+        }
     }
 }
 
@@ -231,6 +240,13 @@ impl Clouds {
 }
 
 impl ParticleDesc {
+    /// Where the particle is after `seconds` in a wind of x, z [m/s].
+    #[must_use]
+    pub fn after(&self, seconds: f64, wind: [f64; 2]) -> [f64; 3] {
+        let carried = [wind[0], 0.0, wind[1]];
+        std::array::from_fn(|axis| self.centre[axis] + (self.velocity[axis] + carried[axis]) * seconds)
+    }
+
     /// Checks every field. `name` is what an error calls the particle; it is only asked for when something is wrong, since
     /// lists are long.
     ///
@@ -262,6 +278,9 @@ impl ParticleDesc {
         }
         if !self.colour.iter().all(|c| (0.0..=1.0e6).contains(c)) {
             check::each_within(&field("colour"), self.colour, 0.0..=1.0e6, "")?;
+        }
+        if !self.velocity.iter().all(|v| v.abs() <= 1.0e4) {
+            check::each_within(&field("velocity"), self.velocity, -1.0e4..=1.0e4, "m/s")?;
         }
         Ok(())
     }

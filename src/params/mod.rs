@@ -7,6 +7,7 @@
 //! World axes: right-handed, +y up, +x east, −z north, metres; `y = 0` is sea level. Yaw and azimuth are compass angles:
 //! 0 is north (−z), 90 is east (+x). Pitch and elevation grow upwards.
 
+mod animation;
 mod axes;
 mod camera;
 pub(crate) mod check;
@@ -16,17 +17,18 @@ mod sky;
 pub mod solar;
 mod sun;
 
+pub use animation::{Animation, CameraKey, CloudMotion, WIND_LAYERS};
 pub use axes::{
     AxisValue, BLENDS, LIGHTINGS, LightingMethod, PHASES, Row, SOURCES, STYLES, SourceKind, TRANSFERS, lightings_of,
     lookup,
 };
-pub use camera::{Aim, Animation, Basis, Camera};
+pub use camera::{Aim, Basis, Camera};
 pub use clouds::{Clouds, Coverage, CoverageMap, Lighting, ParticleDesc, Phase, Source, Style, Transfer};
 pub use quality::{Blend, Precision, Preset, Quality, WINDOWS};
 pub use sky::{Film, Ground, Sky, SkyModel, ToneCurve};
 pub use sun::{Sun, SunPosition};
 
-use crate::Result;
+use crate::{Error, Result};
 
 /// All parameters of a picture or a sequence of pictures.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,6 +64,7 @@ impl Params {
         self.sky.validate()?;
         self.film.validate()?;
         self.animation.validate()?;
+        self.validate_motion()?;
         axes::validate(self)?;
         if self.sky.model == SkyModel::Atmosphere {
             // Below sea level the clear sky's rays would start inside the planet.
@@ -75,11 +78,45 @@ impl Params {
         Ok(())
     }
 
-    /// The parameters of frame `frame`: the camera moved and turned by [`Animation`]; frame 0 is `self`.
+    /// Checks that what the animation moves is there to be moved.
+    fn validate_motion(&self) -> Result<()> {
+        let animation = &self.animation;
+        let by_time = matches!(self.sun.position, SunPosition::Time { .. });
+        for (field, rate, fits, beside) in [
+            ("sun_rate", animation.sun_rate, by_time, "0, or sun.time beside it"),
+            ("sun_elevation_rate", animation.sun_elevation_rate, !by_time, "0, or a sun by elevation and azimuth"),
+            ("sun_azimuth_rate", animation.sun_azimuth_rate, !by_time, "0, or a sun by elevation and azimuth"),
+        ] {
+            if rate != 0.0 && !fits {
+                return Err(Error::invalid(format!("animation.{field}"), rate, beside));
+            }
+        }
+        if animation.wind.len() > 1 && !matches!(self.clouds.source, Source::Grid) {
+            let value = format!("{} vectors", animation.wind.len());
+            let expected =
+                "one vector: layers are those of clouds.source = \"grid\"; particles have velocities of their own";
+            return Err(Error::invalid("animation.wind", value, expected));
+        }
+        if animation.evolution != 0.0 && !matches!(self.clouds.source, Source::Grid) {
+            let expected = "0: only clouds of clouds.source = \"grid\" change their shapes";
+            return Err(Error::invalid("animation.evolution", animation.evolution, expected));
+        }
+        Ok(())
+    }
+
+    /// The parameters of frame `frame`, at `frame / frame_rate` seconds after `self`: what [`Animation`] moves is moved,
+    /// explicit particles have gone with the wind and their velocities. Frame 0 of a scene without camera path is `self`.
     #[must_use]
     pub fn at_frame(&self, frame: u32) -> Self {
         let mut params = self.clone();
+        let seconds = f64::from(frame) / self.animation.frame_rate;
         params.camera = self.animation.camera_at(&self.camera, frame);
+        params.animation.time += seconds;
+        params.sun.position = self.animation.sun_after(self.sun.position, seconds);
+        if let Source::Particles(particles) = &mut params.clouds.source {
+            let wind = self.animation.mean_wind();
+            particles.iter_mut().for_each(|particle| particle.centre = particle.after(seconds, wind));
+        }
         params
     }
 }
@@ -87,7 +124,6 @@ impl Params {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Error;
 
     /// The field that validation blames after `change` has been made to the defaults.
     pub(super) fn blamed(change: impl FnOnce(&mut Params)) -> String {
@@ -158,12 +194,70 @@ mod tests {
 
     #[test]
     fn frames_move_and_turn_the_camera() {
-        let animation = Animation { velocity: [10.0, 0.0, -2.0], yaw_rate: 1.5, pitch_rate: 0.0 };
+        let animation = Animation { velocity: [10.0, 0.0, -2.0], yaw_rate: 1.5, ..Animation::default() };
         let params = Params { animation, ..Params::default() };
         let later = params.at_frame(4);
         let [x, y, z] = params.camera.position;
         assert_eq!(later.camera.position, [x + 40.0, y, z - 8.0]);
         assert_eq!(later.camera.aim, Aim::Angles { yaw: 6.0, pitch: 8.0 });
         assert_eq!(params.at_frame(0), params);
+    }
+
+    #[test]
+    fn time_moves_the_sun_the_clouds_and_the_particles_and_composes() {
+        let mut params = Params::default();
+        params.animation = Animation {
+            frame_rate: 4.0,
+            wind: vec![[8.0, -2.0]],
+            sun_elevation_rate: 2.0,
+            sun_azimuth_rate: -4.0,
+            ..Animation::default()
+        };
+        let particle = ParticleDesc { centre: [1.0, 2.0, 3.0], velocity: [0.0, 16.0, 4.0], ..ParticleDesc::default() };
+        params.clouds.source = Source::Particles(vec![particle]);
+        let later = params.at_frame(6); // 1.5 s
+        assert_eq!(later.animation.time, 1.5);
+        assert_eq!(later.animation.clouds().drift, [12.0, -3.0]);
+        assert_eq!(later.sun.position, SunPosition::Angles { elevation: 38.0, azimuth: 144.0 });
+        let Source::Particles(list) = &later.clouds.source else { panic!("still a list") };
+        assert_eq!(list[0].centre, [13.0, 26.0, 6.0]);
+        assert_eq!(params.at_frame(2).at_frame(4), later);
+        params.sun.position = SunPosition::Time { unix_seconds: 1.0e9, latitude: 0.0, longitude: 0.0 };
+        params.animation.sun_rate = 3600.0;
+        let SunPosition::Time { unix_seconds, .. } = params.at_frame(8).sun.position else { panic!("still by time") };
+        assert_eq!(unix_seconds, 1.0e9 + 7200.0);
+    }
+
+    #[test]
+    fn bad_motion_is_named_as_a_scene_file_writes_it() {
+        let animated = |change: fn(&mut Animation)| blamed(|p| change(&mut p.animation));
+        assert_eq!(animated(|a| a.frame_rate = 0.0), "animation.frame_rate");
+        assert_eq!(animated(|a| a.wind = vec![[1.0, f64::NAN]]), "animation.wind[1]");
+        assert_eq!(animated(|a| a.wind = vec![[0.0; 2], [f64::INFINITY, 0.0]]), "animation.wind[1][0]");
+        assert_eq!(animated(|a| a.wind = vec![[0.0; 2]; 9]), "animation.wind");
+        assert_eq!(animated(|a| a.evolution = -1.0), "animation.evolution");
+        assert_eq!(animated(|a| a.evolution = f64::NAN), "animation.evolution");
+        assert_eq!(animated(|a| a.sun_rate = 60.0), "animation.sun_rate");
+        assert_eq!(animated(|a| a.sun_azimuth_rate = f64::INFINITY), "animation.sun_azimuth_rate");
+        let keys = |times: [f64; 2]| {
+            blamed(|p| {
+                let key = |time| CameraKey { time, position: [0.0, 10.0, 0.0], aim: p.camera.aim };
+                p.animation.keys = times.map(key).to_vec();
+            })
+        };
+        assert_eq!(keys([0.0, 1.0]), "nothing");
+        assert_eq!(keys([1.0, 1.0]), "animation.key[1].time");
+        assert_eq!(keys([1.0, 0.0]), "animation.key[1].time");
+        assert_eq!(keys([f64::NAN, 0.0]), "animation.key[0].time");
+        let both = blamed(|p| {
+            p.animation.keys = vec![CameraKey { time: 0.0, position: [0.0, 10.0, 0.0], aim: p.camera.aim }];
+            p.animation.velocity = [1.0, 0.0, 0.0];
+        });
+        assert_eq!(both, "animation.velocity");
+        let shear = blamed(|p| {
+            p.clouds.source = Source::Particles(vec![ParticleDesc::default()]);
+            p.animation.wind = vec![[0.0; 2], [1.0, 0.0]];
+        });
+        assert_eq!(shear, "animation.wind");
     }
 }

@@ -510,9 +510,10 @@ fn make_sky(frames: &mut Frames, params: &Params, renderer: &Renderer, frame: &F
 
 /// Of everything that the sums depend on. (Film and background do not change them.)
 fn fingerprint(params: &Params, extent: [u32; 2], options: &PathOptions) -> [u8; 32] {
+    let (motion, lean) = (params.animation.clouds(), params.animation.lean());
     let params = Params { film: Film::default(), animation: Default::default(), ..params.clone() };
     let mut hasher = blake3::Hasher::new();
-    hasher.update(format!("{params:?} {extent:?} {options:?}").as_bytes());
+    hasher.update(format!("{params:?} {motion:?} {lean:?} {extent:?} {options:?}").as_bytes());
     hasher.update(trace::PROGRAM.stages[0].spirv);
     *hasher.finalize().as_bytes()
 }

@@ -45,29 +45,39 @@ pub fn lattice_point(position: [i32; 2], frequency: i32) -> LatticePoint {
     LatticePoint { cell: product.map(|p| (p >> 32) as i32), fraction: product.map(|p| unit_float(p as u32)) }
 }
 
+/// A random number that moves with time: `start`, 31 bits, walks to and fro over its range at a pace of its own, so that an
+/// even distribution stays one. 24 bits; at phase 0 the upper ones of `start`. 2²⁴ of the phase are a life.
+#[must_use]
+pub fn walk(start: u32, pace: u32, phase: u32) -> u32 {
+    let way = phase.wrapping_mul(64 + (pace & 127));
+    let at = if pace & 128 == 0 { start.wrapping_add(way) } else { start.wrapping_sub(way) };
+    (if at >= 0x8000_0000 { !at } else { at }) >> 7
+}
+
 fn quintic(f: f32) -> f32 {
     let cube = (f * f) * f;
     let slope = f * 6.0 - 15.0;
     cube * (f * slope + 10.0)
 }
 
-fn lattice_gradient(corner: [i32; 2], x: f32, z: f32, seed: u32) -> f32 {
+fn lattice_gradient(corner: [i32; 2], x: f32, z: f32, seed: u32, phase: u32) -> f32 {
     let hash = hash_lattice(corner, seed);
-    let gx = (hash & 0xffff) as f32 * 3.051_757_8e-5 - 1.0;
-    let gz = (hash >> 16) as f32 * 3.051_757_8e-5 - 1.0;
+    let pace = pcg(hash);
+    let gx = walk((hash & 0xffff) << 15, pace, phase) as f32 * 1.192_092_9e-7 - 1.0;
+    let gz = walk(hash >> 16 << 15, pace >> 8, phase) as f32 * 1.192_092_9e-7 - 1.0;
     gx * x + gz * z
 }
 
 /// Gradient noise, zero mean, mostly within ±0.6.
 #[must_use]
-pub fn gradient_noise(p: LatticePoint, seed: u32) -> f32 {
+pub fn gradient_noise(p: LatticePoint, seed: u32, phase: u32) -> f32 {
     let [x, z] = p.fraction;
     let (x1, z1) = (x - 1.0, z - 1.0);
     let corner = |dx: i32, dz: i32| [p.cell[0].wrapping_add(dx), p.cell[1].wrapping_add(dz)];
-    let a = lattice_gradient(corner(0, 0), x, z, seed);
-    let b = lattice_gradient(corner(1, 0), x1, z, seed);
-    let c = lattice_gradient(corner(0, 1), x, z1, seed);
-    let d = lattice_gradient(corner(1, 1), x1, z1, seed);
+    let a = lattice_gradient(corner(0, 0), x, z, seed, phase);
+    let b = lattice_gradient(corner(1, 0), x1, z, seed, phase);
+    let c = lattice_gradient(corner(0, 1), x, z1, seed, phase);
+    let d = lattice_gradient(corner(1, 1), x1, z1, seed, phase);
     let (u, v) = (quintic(x), quintic(z));
     let ab = a + u * (b - a);
     let cd = c + u * (d - c);
@@ -76,17 +86,18 @@ pub fn gradient_noise(p: LatticePoint, seed: u32) -> f32 {
 
 /// One round heap per lattice cell; the highest of the nine nearest, at least 0.
 #[must_use]
-pub fn heaps(p: LatticePoint, seed: u32) -> f32 {
+pub fn heaps(p: LatticePoint, seed: u32, phase: u32) -> f32 {
     let mut highest = 0.0f32;
     for dz in -1..=1 {
         for dx in -1..=1 {
             let hash = hash_lattice([p.cell[0].wrapping_add(dx), p.cell[1].wrapping_add(dz)], seed);
             let shape = pcg(hash);
-            let place_x = (hash & 0xffff) as f32 * 1.068_115_2e-5 + 0.15;
-            let place_z = (hash >> 16) as f32 * 1.068_115_2e-5 + 0.15;
+            let pace = pcg(shape);
+            let place_x = walk((hash & 0xffff) << 15, pace, phase) as f32 * 4.172_325e-8 + 0.15;
+            let place_z = walk(hash >> 16 << 15, pace >> 8, phase) as f32 * 4.172_325e-8 + 0.15;
             let x = (dx as f32 - p.fraction[0]) + place_x;
             let z = (dz as f32 - p.fraction[1]) + place_z;
-            let narrow = unit_float(shape);
+            let narrow = walk(shape >> 8 << 7, pace >> 16, phase) as f32 * 5.960_464_5e-8;
             let inverse_r2 = (narrow * narrow) * 2.6 + 0.85;
             let height = 1.0 - narrow * 0.55;
             let d2 = x * x + z * z;
@@ -109,6 +120,10 @@ pub struct FieldFrequencies {
     pub streak: i32,
     /// Weather.
     pub region: i32,
+    /// Phase of what grows and dissolves, 2⁻²⁴ lives; see [`walk`].
+    pub phase: u32,
+    /// The same of streaks and weather, which are slower.
+    pub weather_phase: u32,
 }
 
 /// Positive far inside a cloud, lowest in clear sky. `resolved`: share of fine detail that the caller's cells can show; 1
@@ -116,12 +131,16 @@ pub struct FieldFrequencies {
 #[must_use]
 pub fn coverage_field(position: [i32; 2], f: FieldFrequencies, seed: u32, resolved: f32) -> f32 {
     let octave = |index: u32| seed.wrapping_add(index);
-    let heap = heaps(lattice_point(position, f.heap), seed) * 1.35;
-    let n1 = gradient_noise(lattice_point(position, f.billow), octave(1)) * 0.5;
-    let n2 = gradient_noise(lattice_point(position, f.billow * 2), octave(2)) * 0.28 * resolved;
-    let n3 = gradient_noise(lattice_point(position, f.billow * 4), octave(3)) * 0.15 * resolved * resolved;
-    let streak = gradient_noise(lattice_point(position, f.streak), octave(4)) + 0.75;
-    let region = gradient_noise(lattice_point(position, f.region), octave(5)) + 1.0;
+    let heap = heaps(lattice_point(position, f.heap), seed, f.phase) * 1.35;
+    let n1 = gradient_noise(lattice_point(position, f.billow), octave(1), f.phase) * 0.5;
+    let n2 =
+        gradient_noise(lattice_point(position, f.billow * 2), octave(2), f.phase.wrapping_mul(2)) * 0.28 * resolved;
+    let n3 = gradient_noise(lattice_point(position, f.billow * 4), octave(3), f.phase.wrapping_mul(4))
+        * 0.15
+        * resolved
+        * resolved;
+    let streak = gradient_noise(lattice_point(position, f.streak), octave(4), f.weather_phase) + 0.75;
+    let region = gradient_noise(lattice_point(position, f.region), octave(5), f.weather_phase) + 1.0;
     let weather = (streak * region) * 0.55;
     let outline = (n1 + n2) + n3;
     (heap + outline) + weather
@@ -130,7 +149,7 @@ pub fn coverage_field(position: [i32; 2], f: FieldFrequencies, seed: u32, resolv
 /// Height of the turrets that stand on a heap, 0 to 1.
 #[must_use]
 pub fn turret_field(position: [i32; 2], f: FieldFrequencies, seed: u32) -> f32 {
-    heaps(lattice_point(position, f.turret), seed.wrapping_add(6))
+    heaps(lattice_point(position, f.turret), seed.wrapping_add(6), f.phase)
 }
 
 #[cfg(test)]
@@ -156,7 +175,15 @@ mod tests {
 
     #[test]
     fn the_field_is_continuous_across_lattice_borders() {
-        let f = FieldFrequencies { heap: 1 << 22, billow: 1 << 23, turret: 1 << 23, streak: 1 << 19, region: 1 << 16 };
+        let f = FieldFrequencies {
+            heap: 1 << 22,
+            billow: 1 << 23,
+            turret: 1 << 23,
+            streak: 1 << 19,
+            region: 1 << 16,
+            phase: 0,
+            weather_phase: 0,
+        };
         let mut previous = coverage_field([-5000, 777], f, 3, 1.0);
         for x in -4999..5000 {
             let value = coverage_field([x, 777], f, 3, 1.0);
@@ -164,5 +191,36 @@ mod tests {
             assert!((value - previous).abs() < 0.02, "jump of {} at {x}", value - previous);
             previous = value;
         }
+    }
+
+    #[test]
+    fn a_walk_keeps_an_even_distribution_even_and_starts_where_it_stands() {
+        for phase in [0, 1 << 22, 1 << 24, 77 << 24, u32::MAX] {
+            let mut counts = [0; 16];
+            (0..16_384u32).for_each(|i| counts[(walk(pcg(i) >> 1, pcg(i + 99_999), phase) >> 20) as usize] += 1);
+            // Mean 1024, standard deviation 31; five of them.
+            assert!(counts.iter().all(|&count| (869..=1179).contains(&count)), "phase {phase}: {counts:?}");
+        }
+        assert_eq!(walk(0x1234_5678, 200, 0), 0x1234_5678 >> 7);
+    }
+
+    #[test]
+    fn the_field_changes_smoothly_with_time_through_the_end_of_its_period() {
+        let at = |phase: u32| {
+            let (heap, billow, turret, streak, region) = (1 << 22, 1 << 23, 1 << 23, 1 << 19, 1 << 16);
+            let f = FieldFrequencies { heap, billow, turret, streak, region, phase, weather_phase: phase };
+            [[-5000, 777], [123, 4567], [88_000, -3]].map(|place| coverage_field(place, f, 3, 1.0))
+        };
+        let mut moved = 0.0f32;
+        for step in 0..2000u32 {
+            let phase = (step << 14).wrapping_sub(1000 << 14); // 2⁻¹⁰ lives a step, across 0
+            let (before, after) = (at(phase), at(phase.wrapping_add(1 << 14)));
+            for (a, b) in before.iter().zip(after) {
+                // A heap moves at most 1.5 · 0.7 cells a life in each axis, with a slope below 4; noises add less.
+                assert!((a - b).abs() < 0.015, "{a} {b} at {phase}");
+                moved += (a - b).abs();
+            }
+        }
+        assert!(moved > 1.0, "{moved}");
     }
 }

@@ -4,7 +4,7 @@
 //! operations, hence bit-equal. A particle's own floats agree to rounding: shaders may divide and normalise with a few
 //! units in the last place.
 
-use crate::grid::params::GridParams;
+use crate::grid::params::{GridParams, LAYER_CAPACITY};
 use crate::reference::density::{
     coverage_field, hash_lattice, lattice_point, pcg, signed_float, turret_field, unit_float,
 };
@@ -157,7 +157,52 @@ pub fn cell_shape(place: &CellPlace, coverage: f32, p: &GridParams) -> CellShape
             return CellShape { height, body, weight, ..CellShape::default() };
         }
     }
+    let mut layers = layers;
+    if p.evolving != 0 {
+        weight *= smooth_unit(excess * 20.0);
+        let steps_now = height * p.ring_layer[place.ring as usize][1];
+        layers = (steps_now.ceil() as i32).clamp(1, p.ring_first[place.ring as usize][2]) as u32;
+        if weight <= 0.0 {
+            return CellShape { height, body, weight, ..CellShape::default() };
+        }
+    }
     CellShape { layers, puffs, height, body, weight }
+}
+
+fn column_steps(place: &CellPlace, shape: &CellShape, p: &GridParams) -> f32 {
+    shape.height * p.ring_layer[place.ring as usize][1]
+}
+
+fn column_lean(up: f32, p: &GridParams) -> [f32; 2] {
+    if p.lean_count < 2 {
+        return [0.0; 2];
+    }
+    let knots = up.clamp(0.0, 1.0) * (p.lean_count - 1) as f32;
+    let knot = (knots as u32).min(p.lean_count - 2);
+    let at = |i: u32, axis: usize| p.lean[i as usize / 2][i as usize % 2 * 2 + axis];
+    [0, 1].map(|axis| {
+        let t = knots - knot as f32;
+        at(knot, axis) * (1.0 - t) + at(knot + 1, axis) * t
+    })
+}
+
+fn layer_fade(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams) -> f32 {
+    if p.evolving == 0 || layer == 0 || layer + 1 < shape.layers {
+        return 1.0;
+    }
+    (column_steps(place, shape, p) - layer as f32).clamp(0.0, 1.0)
+}
+
+fn puff_fade(place: &CellPlace, shape: &CellShape, index: u32, id: u32, p: &GridParams) -> f32 {
+    if p.evolving == 0 {
+        return 1.0;
+    }
+    let host = id % p.ring_first[place.ring as usize][2] as u32;
+    if host >= shape.layers {
+        return 0.0;
+    }
+    let stays = index == shape.layers && hash_lattice(place.absolute, p.seed.wrapping_add(15)) & 1 == 1;
+    layer_fade(place, shape, host, p) * if stays { 1.0 } else { 1.0 - shape.body }
 }
 
 fn quaternion_multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
@@ -186,17 +231,24 @@ fn hashes<const N: usize>(id: u32) -> [u32; N] {
     h
 }
 
-fn ball_id(place: &CellPlace, index: u32, p: &GridParams) -> u32 {
+fn ball_id(place: &CellPlace, shape: &CellShape, index: u32, p: &GridParams) -> u32 {
+    let index = if p.evolving != 0 && index >= shape.layers { index + LAYER_CAPACITY - shape.layers } else { index };
     let cell = hash_lattice(place.absolute, p.seed.wrapping_add(16).wrapping_add(place.ring));
     pcg(cell.wrapping_add(index.wrapping_mul(0x9e37_79b9)))
 }
 
 fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams) -> Ball {
-    let id = ball_id(place, layer, p);
+    let id = ball_id(place, shape, layer, p);
     let h: [u32; 6] = hashes(id);
     let edge = p.ring_frame[place.ring as usize][2];
-    let step = shape.height / shape.layers as f32;
-    let up = (layer as f32 + 0.5) / shape.layers as f32;
+    let mut step = shape.height / shape.layers as f32;
+    let mut up = (layer as f32 + 0.5) / shape.layers as f32;
+    if p.evolving != 0 {
+        if shape.layers > 1 {
+            step = p.ring_layer[place.ring as usize][0];
+        }
+        up = ((layer as f32 + 0.5) / column_steps(place, shape, p).max(1.0)).min(1.0);
+    }
 
     let rare = (h[0] & 255) as f32 / 256.0;
     let large = if place.ring == 0 { 1.1 * rare * rare * rare } else { 0.6 * rare * rare };
@@ -206,25 +258,30 @@ fn column_ball(place: &CellPlace, shape: &CellShape, layer: u32, p: &GridParams)
     let tall = if layer == 0 { tall.min(0.8 * step) } else { tall };
 
     let jitter = if layer == 0 { 0.03 } else { 0.15 };
-    let x = place.centre[0] + signed_float(h[2]) * (0.4 * edge);
-    let z = place.centre[1] + signed_float(h[3]) * (0.4 * edge);
+    let up_metres = if layer == 0 { (0.5 * step).max(0.8 * tall) } else { (layer as f32 + 0.5) * step };
+    let rise = up_metres + signed_float(h[4]) * jitter * 2.0 * tall;
+    let lean = column_lean(rise / p.thickness, p);
+    let x = place.centre[0] + signed_float(h[2]) * (0.4 * edge) + lean[0];
+    let z = place.centre[1] + signed_float(h[3]) * (0.4 * edge) + lean[1];
     let (dx, dz) = (x - p.camera[0], z - p.camera[2]);
     let base = p.altitude - (dx * dx + dz * dz) * p.inverse_diameter;
-    let up_metres = if layer == 0 { (0.5 * step).max(0.8 * tall) } else { (layer as f32 + 0.5) * step };
-    let y = base + up_metres + signed_float(h[4]) * jitter * 2.0 * tall;
+    let y = base + rise;
     Ball { centre: [x, y, z], across, tall, id, hash: h[5] }
 }
 
 /// Layer that carries a puff with hash `id`.
 #[must_use]
-pub fn puff_host(id: u32, shape: &CellShape) -> u32 {
+pub fn puff_host(id: u32, shape: &CellShape, ring: u32, p: &GridParams) -> u32 {
+    if p.evolving != 0 {
+        return (id % p.ring_first[ring as usize][2] as u32).min(shape.layers - 1);
+    }
     if shape.body < 1.0 { id % shape.layers } else { shape.layers - 1 }
 }
 
 fn puff_ball(place: &CellPlace, shape: &CellShape, index: u32, p: &GridParams) -> Ball {
-    let id = ball_id(place, index, p);
+    let id = ball_id(place, shape, index, p);
     let h: [u32; 5] = hashes(id);
-    let host = column_ball(place, shape, puff_host(id, shape), p);
+    let host = column_ball(place, shape, puff_host(id, shape, place.ring, p), p);
     let side = [signed_float(h[0]), 0.15 + unit_float(h[1]), signed_float(h[2])];
     let length = side.iter().map(|c| c * c).sum::<f32>().sqrt();
     let across = host.across * (0.42 + 0.26 * unit_float(h[3]));
@@ -236,8 +293,13 @@ fn puff_ball(place: &CellPlace, shape: &CellShape, index: u32, p: &GridParams) -
 /// Particle `index` of a column: its layers from the base up, then its puffs.
 #[must_use]
 pub fn column_particle(place: &CellPlace, shape: &CellShape, index: u32, p: &GridParams) -> Particle {
-    let ball =
-        if index >= shape.layers { puff_ball(place, shape, index, p) } else { column_ball(place, shape, index, p) };
+    let (ball, fade) = if index >= shape.layers {
+        let ball = puff_ball(place, shape, index, p);
+        let fade = puff_fade(place, shape, index, ball.id, p);
+        (ball, fade)
+    } else {
+        (column_ball(place, shape, index, p), layer_fade(place, shape, index, p))
+    };
     let (h1, h2) = (pcg(ball.hash), pcg(pcg(ball.hash)));
     let axes = [ball.across * (0.88 + 0.24 * unit_float(h1)), ball.tall, ball.across];
 
@@ -257,7 +319,7 @@ pub fn column_particle(place: &CellPlace, shape: &CellShape, index: u32, p: &Gri
         density: p.density * (0.1 + 0.9 * shape.body * (0.4 + 0.6 * shape.body)),
         rotation,
         semi_axes,
-        fade: shape.weight,
+        fade: shape.weight * fade,
         colour: [1.0; 3],
         id: ball.id,
     }

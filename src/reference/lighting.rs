@@ -93,7 +93,7 @@ pub fn smooth(grid: &Grid, p: &GridParams, share_of_sun: &[f64], smoothing: f64,
     let dim = p.ring_dim as i64;
     let (shape, particle) = (grid.shapes[cell], &grid.particles[index]);
     let puff = within >= shape.layers;
-    let layer = if puff { puff_host(particle.id, &shape) } else { within };
+    let layer = if puff { puff_host(particle.id, &shape, (cell as i64 / (dim * dim)) as u32, p) } else { within };
     let away = vec(particle.centre) - vec(p.camera);
     let base = f64::from(p.altitude) - (away.x * away.x + away.z * away.z) * f64::from(p.inverse_diameter);
     let height = f64::from(particle.centre[1]) - base;

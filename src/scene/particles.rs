@@ -1,5 +1,5 @@
 //! Explicit particles: `[[clouds.particle]]` tables, or a CSV file of
-//! `x,y,z,rx,ry,rz,qx,qy,qz,qw,density[,r,g,b]` with one particle a line.
+//! `x,y,z,rx,ry,rz,qx,qy,qz,qw,density[,r,g,b[,vx,vy,vz]]` with one particle a line.
 //!
 //! In the file a first line of column names, empty lines and lines that begin with `#` are allowed. Quaternions are
 //! normalised in both.
@@ -11,9 +11,12 @@ use serde::Deserialize;
 use crate::params::ParticleDesc;
 use crate::{Error, Result};
 
-const COLUMNS: [&str; 14] = ["x", "y", "z", "rx", "ry", "rz", "qx", "qy", "qz", "qw", "density", "r", "g", "b"];
+const COLUMNS: [&str; 17] =
+    ["x", "y", "z", "rx", "ry", "rz", "qx", "qy", "qz", "qw", "density", "r", "g", "b", "vx", "vy", "vz"];
 /// Columns up to and including the density; the colour is optional.
 const WITHOUT_COLOUR: usize = 11;
+/// Columns up to and including the colour; the velocity is optional.
+const WITHOUT_VELOCITY: usize = 14;
 
 /// One `[[clouds.particle]]`.
 #[derive(Deserialize)]
@@ -29,6 +32,8 @@ pub struct ParticleKeys {
     pub density: Option<f32>,
     /// Flat colour.
     pub colour: Option<[f32; 3]>,
+    /// Motion [m/s].
+    pub velocity: Option<[f64; 3]>,
 }
 
 /// The particles of `[[clouds.particle]]` tables.
@@ -48,6 +53,7 @@ pub fn inline(list: Vec<ParticleKeys>) -> Result<Vec<ParticleDesc>> {
                 rotation,
                 density: keys.density.unwrap_or(defaults.density),
                 colour: keys.colour.unwrap_or(defaults.colour),
+                velocity: keys.velocity.unwrap_or(defaults.velocity),
             })
         })
         .collect()
@@ -70,8 +76,9 @@ fn parse(text: &str, path: &Path) -> Result<Vec<ParticleDesc>> {
         }
         let at = |column: usize, reason: String| Error::FileAt { path: path.into(), line: index + 1, column, reason };
         let cells: Vec<(usize, &str)> = cells(line);
-        if ![WITHOUT_COLOUR, COLUMNS.len()].contains(&cells.len()) {
-            let expected = format!("{WITHOUT_COLOUR} or {}: {}", COLUMNS.len(), COLUMNS.join(","));
+        if ![WITHOUT_COLOUR, WITHOUT_VELOCITY, COLUMNS.len()].contains(&cells.len()) {
+            let most = COLUMNS.len();
+            let expected = format!("{WITHOUT_COLOUR}, {WITHOUT_VELOCITY} or {most}: {}", COLUMNS.join(","));
             return Err(at(1, format!("{} columns: expected {expected}", cells.len())));
         }
         if std::mem::take(&mut first) && cells.iter().all(|(_, cell)| cell.parse::<f64>().is_err()) {
@@ -84,7 +91,7 @@ fn parse(text: &str, path: &Path) -> Result<Vec<ParticleDesc>> {
         for (slot, ((column, cell), name)) in cells.iter().zip(COLUMNS).enumerate() {
             numbers[slot] = cell.parse().map_err(|_| at(*column, format!("{name} = {cell:?}: expected a number")))?;
         }
-        let has_colour = cells.len() == COLUMNS.len();
+        let has_colour = cells.len() >= WITHOUT_VELOCITY;
         let particle = particle(&numbers, has_colour)
             .ok_or_else(|| at(cells[6].0, "qx,qy,qz,qw: expected a quaternion other than 0".into()))?;
         particle.validate(|| "the particle".into()).map_err(|error| at(1, error.to_string()))?;
@@ -117,6 +124,7 @@ fn particle(numbers: &[f64; COLUMNS.len()], has_colour: bool) -> Option<Particle
         rotation: normalised(std::array::from_fn(|i| at(6 + i)))?,
         density: at(10),
         colour: if has_colour { std::array::from_fn(|i| at(11 + i)) } else { ParticleDesc::default().colour },
+        velocity: std::array::from_fn(|i| numbers[WITHOUT_VELOCITY + i]), // 0 where the line has none
     })
 }
 
@@ -147,19 +155,23 @@ mod tests {
             rotation: [0.0, 0.0, 0.0, 1.0],
             density: 0.5,
             colour: [1.0; 3],
+            velocity: [0.0; 3],
         };
         assert_eq!(read(text).unwrap(), [expected]);
         let coloured = read("1,2,3,4,5,6,0,0,0,1,0.5,0.1,0.2,0.3\r\n").unwrap();
         assert_eq!(coloured, [ParticleDesc { colour: [0.1, 0.2, 0.3], ..expected }]);
+        let moving = read("1,2,3,4,5,6,0,0,0,1,0.5,1,1,1,7,-8,9.5").unwrap();
+        assert_eq!(moving, [ParticleDesc { velocity: [7.0, -8.0, 9.5], ..expected }]);
     }
 
     #[test]
     fn faults_name_line_column_and_expectation() {
         let good = "0,0,0,1,1,1,0,0,0,1,1\n";
         assert_eq!(complaint(&format!("{good}0,0,0,1,1,x,0,0,0,1,1")), "cloud.csv:2:11: rz = \"x\": expected a number");
-        assert!(complaint(&format!("{good}\n1,2,3")).starts_with("cloud.csv:3:1: 3 columns: expected 11 or 14"));
+        assert!(complaint(&format!("{good}\n1,2,3")).starts_with("cloud.csv:3:1: 3 columns: expected 11, 14 or 17"));
         assert!(complaint("0,0,0,1,1,1,0,0,0,0,1").starts_with("cloud.csv:1:13: qx,qy,qz,qw: expected a quaternion"));
         assert!(complaint("0,0,0,1,-1,1,0,0,0,1,1").contains("cloud.csv:1:1: the particle.radii[1] = -1"));
+        assert!(complaint("0,0,0,1,1,1,0,0,0,1,1,1,1,1,0,inf,0").contains("velocity[1] = inf"));
         assert!(complaint("0,0,0,1,nan,1,0,0,0,1,1").contains("radii[1] = NaN"));
         assert!(complaint("z,y,x,rx,ry,rz,qx,qy,qz,qw,density").contains("column name \"z\": expected \"x\""));
         assert!(complaint("# nothing\n").contains("no particle"));

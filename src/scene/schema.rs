@@ -8,8 +8,8 @@ use toml::value::{Datetime, Offset};
 use super::particles::ParticleKeys;
 use super::{coverage, particles};
 use crate::params::{
-    Aim, Animation, Camera, Clouds, Coverage, Film, Ground, LIGHTINGS, PHASES, Params, Precision, Preset, Quality,
-    SOURCES, STYLES, Sky, SkyModel, Source, SourceKind, Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
+    Aim, Animation, Camera, CameraKey, Clouds, Coverage, Film, Ground, LIGHTINGS, PHASES, Params, Precision, Preset,
+    Quality, SOURCES, STYLES, Sky, SkyModel, Source, SourceKind, Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
 };
 use crate::{Error, Result};
 
@@ -107,9 +107,34 @@ struct FilmKeys {
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 struct AnimationKeys {
+    frame_rate: Option<f64>,
     velocity: Option<[f64; 3]>,
     yaw_rate: Option<f64>,
     pitch_rate: Option<f64>,
+    wind: Option<WindKeys>,
+    evolution: Option<f64>,
+    sun_rate: Option<f64>,
+    sun_elevation_rate: Option<f64>,
+    sun_azimuth_rate: Option<f64>,
+    key: Option<Vec<PathKeys>>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a vector [x, z], or a list of such vectors from base to top")]
+enum WindKeys {
+    One([f64; 2]),
+    Layers(Vec<[f64; 2]>),
+}
+
+/// One `[[animation.key]]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathKeys {
+    time: f64,
+    position: [f64; 3],
+    yaw: Option<f64>,
+    pitch: Option<f64>,
+    look_at: Option<[f64; 3]>,
 }
 
 /// Puts a given value in place of a default.
@@ -138,14 +163,15 @@ fn one_of<T: Copy>(field: &str, name: &str, names: &[(&str, T)]) -> Result<T> {
 impl Scene {
     /// The parameters that this scene stands for; files are relative to `base`.
     pub fn into_params(self, base: &Path) -> Result<Params> {
+        let camera = self.camera.into_params()?;
         Ok(Params {
-            camera: self.camera.into_params()?,
+            animation: self.animation.into_params(camera.aim)?,
+            camera,
             sun: self.sun.into_params()?,
             clouds: self.clouds.into_params(base)?,
             quality: self.quality.into_params()?,
             sky: self.sky.into_params(base)?,
             film: self.film.into_params()?,
-            animation: self.animation.into_params(),
         })
     }
 }
@@ -339,11 +365,39 @@ impl FilmKeys {
 }
 
 impl AnimationKeys {
-    fn into_params(self) -> Animation {
+    /// `aim` is that of the camera, for keys that have none.
+    fn into_params(self, aim: Aim) -> Result<Animation> {
         let mut animation = Animation::default();
+        set(&mut animation.frame_rate, self.frame_rate);
         set(&mut animation.velocity, self.velocity);
         set(&mut animation.yaw_rate, self.yaw_rate);
         set(&mut animation.pitch_rate, self.pitch_rate);
-        animation
+        set(&mut animation.evolution, self.evolution);
+        set(&mut animation.sun_rate, self.sun_rate);
+        set(&mut animation.sun_elevation_rate, self.sun_elevation_rate);
+        set(&mut animation.sun_azimuth_rate, self.sun_azimuth_rate);
+        animation.wind = match self.wind {
+            None => Vec::new(),
+            Some(WindKeys::One(wind)) => vec![wind],
+            Some(WindKeys::Layers(layers)) => layers,
+        };
+        let keys = self.key.unwrap_or_default().into_iter().enumerate();
+        animation.keys = keys.map(|(index, key)| key.into_params(index, aim)).collect::<Result<_>>()?;
+        Ok(animation)
+    }
+}
+
+impl PathKeys {
+    fn into_params(self, index: usize, aim: Aim) -> Result<CameraKey> {
+        let aim = match (self.look_at, self.yaw, self.pitch) {
+            (Some(target), None, None) => Aim::LookAt(target),
+            (Some(target), ..) => {
+                let field = format!("animation.key[{index}].look_at");
+                return Err(Error::invalid(field, format!("{target:?}"), "either look_at or yaw and pitch"));
+            }
+            (None, None, None) => aim,
+            (None, yaw, pitch) => Aim::Angles { yaw: yaw.unwrap_or(0.0), pitch: pitch.unwrap_or(0.0) },
+        };
+        Ok(CameraKey { time: self.time, position: self.position, aim })
     }
 }

@@ -8,7 +8,7 @@ use crate::definitions::PLANET_RADIUS;
 use crate::gpu::{Gpu, Recorder};
 use crate::grid::{Counters, Grid, GridDesign, ParticleSet};
 use crate::lists::ListUse;
-use crate::params::Params;
+use crate::params::{Animation, CloudMotion, Params};
 
 pub(super) struct GridSource {
     grid: Grid,
@@ -16,12 +16,13 @@ pub(super) struct GridSource {
     spread: Spread,
     base: f64,
     thickness: f64,
+    motion: CloudMotion,
 }
 
 impl GridSource {
     pub(super) fn new(gpu: &Arc<Gpu>, params: &Params, slots: usize) -> Result<Self> {
         let clouds = &params.clouds;
-        let design = GridDesign::new(clouds, &params.quality, PLANET_RADIUS);
+        let design = GridDesign::new(clouds, &params.quality, PLANET_RADIUS).leaning(&params.animation);
         let (base, thickness) = (f64::from(clouds.altitude), f64::from(clouds.thickness));
         Ok(Self {
             grid: Grid::new(gpu, &design, &clouds.coverage, slots)?,
@@ -34,6 +35,7 @@ impl GridSource {
             design,
             base,
             thickness,
+            motion: params.animation.clouds(),
         })
     }
 }
@@ -70,8 +72,12 @@ impl ParticleSource for GridSource {
         }
     }
 
+    fn set_time(&mut self, animation: &Animation) {
+        self.motion = animation.clouds();
+    }
+
     fn record(&mut self, rec: &mut Recorder<'_>, place: &Place, set: &ParticleSet) -> Result<()> {
-        self.grid.record(rec, &self.design.frame(place.centre, place.origin), set)
+        self.grid.record(rec, &self.design.frame_at(place.centre, place.origin, &self.motion), set)
     }
 
     fn cells(&self) -> Option<&Grid> {

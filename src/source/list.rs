@@ -6,20 +6,22 @@ use super::{Layer, ParticleSource, Place, Spread};
 use crate::Result;
 use crate::gpu::{Gpu, Recorder};
 use crate::grid::{ParticleList, ParticleSet};
-use crate::params::ParticleDesc;
+use crate::params::{Animation, ParticleDesc};
 
 pub(super) struct ListSource {
     list: ParticleList,
     /// Least and greatest corner of all particles [m].
     bounds: [[f64; 3]; 2],
     greatest_extent: f32,
+    /// Time for which the list was given [s].
+    since: f64,
 }
 
 impl ListSource {
-    pub(super) fn new(gpu: &Arc<Gpu>, particles: &[ParticleDesc], slots: usize) -> Result<Self> {
+    pub(super) fn new(gpu: &Arc<Gpu>, particles: &[ParticleDesc], since: f64, slots: usize) -> Result<Self> {
         let list = ParticleList::new(gpu, particles, slots)?;
         let (bounds, greatest_extent) = (list.bounds(), list.greatest_extent());
-        Ok(Self { list, bounds, greatest_extent })
+        Ok(Self { list, bounds, greatest_extent, since })
     }
 }
 
@@ -59,6 +61,11 @@ impl ParticleSource for ListSource {
             greatest_extent: self.greatest_extent,
             planet_radius: f64::INFINITY,
         }
+    }
+
+    fn set_time(&mut self, animation: &Animation) {
+        self.list.set_motion(animation.time - self.since, animation.mean_wind());
+        self.bounds = self.list.bounds();
     }
 
     fn record(&mut self, rec: &mut Recorder<'_>, place: &Place, set: &ParticleSet) -> Result<()> {

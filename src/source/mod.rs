@@ -10,7 +10,7 @@ use crate::Result;
 use crate::gpu::{Gpu, Recorder};
 use crate::grid::{Counters, Grid, ParticleSet};
 use crate::lists::ListUse;
-use crate::params::{Params, Source};
+use crate::params::{Animation, Params, Source};
 use crate::tiling::Slab;
 
 /// Where a frame is: the point that its particles are made around, and the floating origin.
@@ -110,6 +110,9 @@ pub(crate) trait ParticleSource {
     /// The air that the particles lie in.
     fn layer(&self, place: &Place) -> Layer;
 
+    /// Moves on to the time of `animation`.
+    fn set_time(&mut self, animation: &Animation);
+
     /// Makes the particles of a frame.
     fn record(&mut self, rec: &mut Recorder<'_>, place: &Place, set: &ParticleSet) -> Result<()>;
 
@@ -139,7 +142,7 @@ pub(crate) trait ParticleSource {
 pub(crate) fn open(gpu: &Arc<Gpu>, params: &Params, slots: usize) -> Result<Box<dyn ParticleSource>> {
     match &params.clouds.source {
         Source::Grid => Ok(Box::new(grid::GridSource::new(gpu, params, slots)?)),
-        Source::Particles(particles) => Ok(Box::new(list::ListSource::new(gpu, particles, slots)?)),
+        Source::Particles(particles) => Ok(Box::new(list::ListSource::new(gpu, particles, params.animation.time, slots)?)),
         Source::Voxels { .. } => panic!("validation has let a source of voxels pass"),
     }
 }

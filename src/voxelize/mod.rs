@@ -92,7 +92,7 @@ impl Voxelizer {
         let push = VoxelPush {
             corner: [0.0; 3],
             edge: 0.0,
-            origin: gathered.origin.map(|c| c as f32),
+            origin: params.animation.clouds().detail_origin(gathered.origin).map(|c| c as f32),
             sigma_t: clouds.sigma_t,
             detail: MediumParams::new(clouds).detail,
             style: style_index(clouds.style),

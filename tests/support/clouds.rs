@@ -6,7 +6,7 @@ use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, Recorder};
 use welkin::grid::{CounterReadback, Counters, Grid, GridDesign, GridParams, ParticleSet};
 use welkin::lighting::tables::Occlusion;
-use welkin::params::{Clouds, Coverage, Quality};
+use welkin::params::{Animation, Clouds, Coverage, Quality};
 use welkin::shared::FrameParams;
 use welkin::tiling::{Slab, Tiling, TilingParams};
 
@@ -33,6 +33,7 @@ pub struct Setup {
     pub camera: [f64; 3],
     pub origin: [f64; 3],
     pub to_sun: [f64; 3],
+    pub animation: Animation,
 }
 
 impl Default for Setup {
@@ -43,17 +44,17 @@ impl Default for Setup {
         let to_sun = [elevation.cos() * azimuth.sin(), elevation.sin(), -elevation.cos() * azimuth.cos()];
         // Far from the world's origin, where f32 positions would have steps of 8 mm.
         let (camera, origin) = ([103_210.4, 500.0, -71_003.7], [103_000.0, 0.0, -71_000.0]);
-        Self { clouds, quality, camera, origin, to_sun }
+        Self { clouds, quality, camera, origin, to_sun, animation: Animation::default() }
     }
 }
 
 impl Setup {
     pub fn design(&self) -> GridDesign {
-        GridDesign::new(&self.clouds, &self.quality, PLANET)
+        GridDesign::new(&self.clouds, &self.quality, PLANET).leaning(&self.animation)
     }
 
     pub fn grid_params(&self) -> GridParams {
-        self.design().frame(self.camera, self.origin)
+        self.design().frame_at(self.camera, self.origin, &self.animation.clouds())
     }
 
     pub fn tiling_params(&self) -> TilingParams {

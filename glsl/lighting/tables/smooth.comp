@@ -49,7 +49,7 @@ void main() {
         add(index, 1.0, weighted, weights);
         bool puff = layer >= shape.layers;
         if (puff) {
-            layer = puff_host(particle.id, shape);
+            layer = puff_host(particle.id, shape, cell / (dim * dim), params.grid);
             add(cell_first.first[cell] + layer, push.smoothing, weighted, weights);
         } else {
             if (layer > 0u) add(index - 1u, push.smoothing, weighted, weights);

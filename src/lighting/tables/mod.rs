@@ -58,9 +58,11 @@ impl Method for TableLight {
                 Ok(())
             }
             Transfer::Diffusion => {
+                let (origin, [east, south]) = (scene.place.origin, scene.drift);
                 let place = VolumePlace {
                     centre: scene.layer.centre,
-                    origin: scene.place.origin,
+                    // Voxels drift with the clouds, so that their light does not flicker.
+                    origin: [origin[0] - east, origin[1], origin[2] - south],
                     base: scene.layer.base,
                     planet_radius: scene.layer.planet_radius,
                     to_sun: scene.to_sun,
