@@ -50,7 +50,7 @@ impl Files {
 pub fn run(args: &ReferenceArgs) -> Result<Outcome> {
     let interrupt = Interrupt::watch()?;
     let files = Files::of(args)?;
-    let params = scenes::load_with_quality(&args.scene, args.quality, &args.args)?;
+    let params = scenes::load_with_quality(&args.scene, args.quality, &args.args)?.at_frame(0);
     let size = args.size;
     let options = PathOptions {
         seed: args.seed,

@@ -85,7 +85,7 @@ pub fn run(args: &VoxelizeArgs) -> Result<Outcome> {
     let side_file = args.output.with_extension("json");
     [&args.output, &side_file].into_iter().try_for_each(|file| places::writable(file))?;
     let interrupt = Interrupt::watch()?;
-    let params = scenes::load_with_quality(&args.scene, args.quality, &args.args)?;
+    let params = scenes::load_with_quality(&args.scene, args.quality, &args.args)?.at_frame(0);
     let mut device = Device::open(&args.args, false)?;
     let frames = device.frames();
     let gpu = frames.gpu().clone();
