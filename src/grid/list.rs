@@ -16,11 +16,13 @@ fn groups_for(count: u32, per_group: u32) -> [u32; 4] {
     [if rows > 1 { 32_768 } else { needed }, rows.max(1), 1, 0]
 }
 
+/// How long particles have moved [s], and the wind x, z that has carried them [m/s].
+type Motion = (f64, [f64; 2]);
+
 /// Uploads an explicit list, relative to the floating origin of each frame.
 pub struct ParticleList {
     particles: Vec<ParticleDesc>,
-    /// How long the particles have moved [s], and the wind that has carried them [m/s].
-    moved: (f64, [f64; 2]),
+    moved: Motion,
     staging: Vec<Staging>,
     no_cells: Buffer,
 }
@@ -31,7 +33,7 @@ struct Staging {
     counters: Buffer,
     args: Buffer,
     /// Origin and motion that `particles` was written for.
-    written: Option<([f64; 3], (f64, [f64; 2]))>,
+    written: Option<([f64; 3], Motion)>,
 }
 
 impl ParticleList {

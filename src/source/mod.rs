@@ -142,7 +142,9 @@ pub(crate) trait ParticleSource {
 pub(crate) fn open(gpu: &Arc<Gpu>, params: &Params, slots: usize) -> Result<Box<dyn ParticleSource>> {
     match &params.clouds.source {
         Source::Grid => Ok(Box::new(grid::GridSource::new(gpu, params, slots)?)),
-        Source::Particles(particles) => Ok(Box::new(list::ListSource::new(gpu, particles, params.animation.time, slots)?)),
+        Source::Particles(particles) => {
+            Ok(Box::new(list::ListSource::new(gpu, particles, params.animation.time, slots)?))
+        }
         Source::Voxels { .. } => panic!("validation has let a source of voxels pass"),
     }
 }
