@@ -63,7 +63,8 @@ fn cells_and_particles_are_those_of_the_reference() {
 fn a_coverage_image_is_sampled_alike_and_repeats() {
     let values: Vec<f32> = (0..15).map(|i| (i * 7 % 15) as f32 / 14.0).collect();
     // 9 km wide: some eight repeats across the rings, on both sides of the origin.
-    let map = CoverageMap { width: 5, height: 3, values: values.clone(), extent: 9_000.0 };
+    let map =
+        CoverageMap { width: 5, height: 3, values: values.clone(), extent: 9_000.0, offset: [0.0; 2], rotation: 0.0 };
     let mut setup = Setup { camera: [0.0, 500.0, 0.0], origin: [0.0; 3], ..Setup::default() };
     setup.clouds.coverage = Coverage::Map(map);
     compare(&setup, &values);
@@ -125,6 +126,43 @@ fn nothing_pops_while_clouds_drift_and_grow() {
         }
         let born = after.iter().filter(|(id, _)| !before.contains_key(id));
         assert!(born.map(|(_, (strength, _))| *strength).fold(0.0f32, f32::max) < 0.02);
+    }
+}
+
+#[test]
+fn a_coverage_image_that_is_moved_and_turned_is_sampled_alike() {
+    let values: Vec<f32> = (0..20).map(|i| (i * 13 % 20) as f32 / 19.0).collect();
+    let mut setup = Setup { camera: [0.0, 500.0, 0.0], origin: [0.0; 3], ..Setup::default() };
+    for (offset, rotation) in [([4_321.0, -98_765.4], -33.0), ([0.0, 0.0], 180.0)] {
+        let map = CoverageMap { width: 4, height: 5, values: values.clone(), extent: 7_000.0, offset, rotation };
+        setup.clouds.coverage = Coverage::Map(map);
+        compare(&setup, &values);
+    }
+}
+
+/// By plain geometry in f64, so that neither sign nor sense hang on the formula that device and oracle share.
+#[test]
+fn a_coverage_image_lies_where_it_is_put_and_its_top_points_where_it_is_turned() {
+    let mut setup = Setup { camera: [0.0, 500.0, 0.0], origin: [0.0; 3], ..Setup::default() };
+    // One white texel, the middle one of the top row of 3 × 3: 2 km towards its top from the picture's centre.
+    let mut values = vec![0.0; 9];
+    values[1] = 1.0;
+    let offset = [3_000.0, 1_000.0];
+    for (rotation, [east, north]) in [(0.0, [0.0, 2_000.0]), (90.0, [2_000.0, 0.0]), (-90.0, [-2_000.0, 0.0])] {
+        let map = CoverageMap { width: 3, height: 3, values: values.clone(), extent: 6_000.0, offset, rotation };
+        setup.clouds.coverage = Coverage::Map(map);
+        let params = setup.grid_params();
+        let peak = [offset[0] + east, offset[1] - north];
+        let distance = |cell: u32| {
+            let centre = grid::cell_place(cell, &params).centre.map(f64::from);
+            (centre[0] - peak[0]).hypot(centre[1] - peak[1])
+        };
+        let ring = 0..params.ring_dim * params.ring_dim;
+        let nearest = ring.min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap();
+        let value = grid::coverage_at(&grid::cell_place(nearest, &params), &values, &params);
+        // Bilinear: falls by 1 over 2 km along each axis.
+        let expected = 1.0 - 2.0 * distance(nearest) / 2_000.0;
+        assert!(distance(nearest) < 200.0 && f64::from(value) > expected, "{rotation}°: {value} of {expected}");
     }
 }
 

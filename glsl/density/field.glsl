@@ -31,6 +31,37 @@ uint walk(uint start, uint pace, uint phase) {
     return (at >= 0x80000000u ? ~at : at) >> 7u;
 }
 
+// A coordinate in 2^-32 lattice cells.
+struct LatticeSum {
+    uint low;
+    int high;
+};
+
+// sum + position × frequency.
+LatticeSum lattice_sum(LatticeSum sum, int position, int frequency) {
+    int high, low;
+    imulExtended(position, frequency, high, low);
+    uint carry;
+    sum.low = uaddCarry(sum.low, uint(low), carry);
+    sum.high += high + int(carry);
+    return sum;
+}
+
+// The point of a lattice that is turned: its axes point along (along, across) and (-across, along), in 2^-32 lattice cells
+// per step, and the position 0 lies `half_cells` half cells from its first point. Exact, as `lattice_point`.
+LatticePoint turned_lattice_point(ivec2 position, int along, int across, ivec2 half_cells) {
+    ivec2 cell;
+    vec2 fraction;
+    for (int axis = 0; axis < 2; ++axis) {
+        LatticeSum sum = LatticeSum(uint(half_cells[axis] & 1) << 31, half_cells[axis] >> 1);
+        sum = lattice_sum(sum, position.x, axis == 0 ? along : -across);
+        sum = lattice_sum(sum, position.y, axis == 0 ? across : along);
+        cell[axis] = sum.high;
+        fraction[axis] = unit_float(sum.low);
+    }
+    return LatticePoint(cell, fraction);
+}
+
 // Quintic fade 6f⁵ - 15f⁴ + 10f³ (Perlin 2002).
 float quintic(float f) {
     precise float cube = (f * f) * f;

@@ -27,8 +27,9 @@ float coverage_at(CellPlace place) {
     if (params.grid.map_width == 0u) return params.grid.coverage;
     int steps = params.grid.ring_first[place.ring].w;
     ivec2 position = place.absolute * steps + (steps >> 1);
-    position -= ivec2(params.grid.map_first_x, params.grid.map_first_z);
-    LatticePoint p = lattice_point(position, params.grid.frequency_map);
+    position -= ivec2(params.grid.map_centre_x, params.grid.map_centre_z);
+    LatticePoint p = turned_lattice_point(position, params.grid.frequency_map_along, params.grid.frequency_map_across,
+                                          ivec2(params.grid.map_width, params.grid.map_height) - 1);
     precise float u = p.fraction.x, v = p.fraction.y;
     precise float a = map_texel(p.cell.x, p.cell.y);
     precise float b = map_texel(p.cell.x + 1, p.cell.y);

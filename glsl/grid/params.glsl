@@ -23,9 +23,10 @@ struct GridParams {
     int frequency_turret;
     int frequency_streak;
     int frequency_region;
-    int frequency_map;               // texels of the coverage image per position step, 2^-32
-    int map_first_x;                 // position step of the coverage image's first texel
-    int map_first_z;
+    int frequency_map_along;         // texels of the coverage image per position step, 2^-32, × cosine of its rotation
+    int frequency_map_across;        // the same × sine
+    int map_centre_x;                // position step of the coverage image's centre
+    int map_centre_z;
     uint map_width;                  // 0: no coverage image
     uint map_height;
     uint ring_count;
@@ -38,6 +39,9 @@ struct GridParams {
     uint weather_phase;
     uint evolving;                   // 1: columns grow and dissolve, and so must without a jump
     uint lean_count;                 // heights that have a lean; 0: upright
+    uint reserved_a;
+    uint reserved_b;
+    uint reserved_c;
 };
 
 FieldFrequencies field_frequencies(GridParams p) {

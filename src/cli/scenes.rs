@@ -7,6 +7,7 @@ use welkin::scene::{self, Override};
 use welkin::{Error, Result};
 
 use super::args::{PictureArgs, QualityArg, SceneArgs};
+use super::progress::note;
 
 /// The parameters of the scene file at `path` under the flags.
 pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
@@ -16,18 +17,22 @@ pub fn load(path: &Path, args: &PictureArgs) -> Result<Params> {
 /// The same with more values replaced, which `flag` gave.
 pub fn load_replaced(path: &Path, args: &PictureArgs, flag: &str, values: &[String]) -> Result<Params> {
     let replaced = values.iter().map(|value| Override { flag: flag.into(), assignment: value.clone() });
-    scene::load(path, &overrides(None, args.quality, &args.scene).chain(replaced).collect::<Vec<_>>())
+    load_noting(path, &overrides(None, args.quality, &args.scene).chain(replaced).collect::<Vec<_>>())
 }
 
 /// The same for commands that make no picture.
 pub fn load_with_quality(path: &Path, quality: Option<QualityArg>, args: &SceneArgs) -> Result<Params> {
-    scene::load(path, &overrides(None, quality, args).collect::<Vec<_>>())
+    load_noting(path, &overrides(None, quality, args).collect::<Vec<_>>())
 }
 
 /// The same with targets of 32-bit floats unless `--set quality.precision` says otherwise: for comparisons.
 pub fn load_precise(path: &Path, args: &PictureArgs) -> Result<Params> {
     let precision = Override { flag: "--set".into(), assignment: "quality.precision=f32".into() };
-    scene::load(path, &overrides(Some(precision), args.quality, &args.scene).collect::<Vec<_>>())
+    load_noting(path, &overrides(Some(precision), args.quality, &args.scene).collect::<Vec<_>>())
+}
+
+fn load_noting(path: &Path, overrides: &[Override]) -> Result<Params> {
+    scene::load_noting(path, overrides, &mut note)
 }
 
 fn overrides(
@@ -54,7 +59,7 @@ pub fn blended(mut params: Params, blend: Option<Blend>, flag: &str) -> Result<P
 pub fn load_medium(path: Option<&Path>, args: &SceneArgs) -> Result<Params> {
     let overrides: Vec<_> = sets(args).collect();
     match path {
-        Some(path) => scene::load(path, &overrides),
+        Some(path) => load_noting(path, &overrides),
         None => scene::parse("", Path::new("the default scene"), &overrides),
     }
 }

@@ -52,12 +52,14 @@ pub struct GridParams {
     pub frequency_streak: i32,
     /// Frequency of the weather.
     pub frequency_region: i32,
-    /// Texels of the coverage image per position step, in 2⁻³².
-    pub frequency_map: i32,
-    /// Position step of the centre of the coverage image's first texel, x.
-    pub map_first_x: i32,
+    /// Texels of the coverage image per position step, in 2⁻³², times the cosine of its rotation.
+    pub frequency_map_along: i32,
+    /// The same, times the sine.
+    pub frequency_map_across: i32,
+    /// Position step of the coverage image's centre, x.
+    pub map_centre_x: i32,
     /// The same, z.
-    pub map_first_z: i32,
+    pub map_centre_z: i32,
     /// Columns of the coverage image; 0: none.
     pub map_width: u32,
     /// Rows of the coverage image.
@@ -82,6 +84,8 @@ pub struct GridParams {
     pub evolving: u32,
     /// Heights that have a lean; 0: upright.
     pub lean_count: u32,
+    /// Fills up to a multiple of 16 bytes.
+    pub reserved: [u32; 3],
 }
 
 assert_layout!(GridParams, grid_params, {
@@ -89,10 +93,11 @@ assert_layout!(GridParams, grid_params, {
     altitude: ALTITUDE, thickness: THICKNESS, inverse_cutoff_squared: INVERSE_CUTOFF_SQUARED,
     inverse_diameter: INVERSE_DIAMETER, coverage: COVERAGE, frequency_heap: FREQUENCY_HEAP,
     frequency_billow: FREQUENCY_BILLOW, frequency_turret: FREQUENCY_TURRET, frequency_streak: FREQUENCY_STREAK,
-    frequency_region: FREQUENCY_REGION, frequency_map: FREQUENCY_MAP, map_first_x: MAP_FIRST_X,
-    map_first_z: MAP_FIRST_Z, map_width: MAP_WIDTH, map_height: MAP_HEIGHT, ring_count: RING_COUNT,
+    frequency_region: FREQUENCY_REGION, frequency_map_along: FREQUENCY_MAP_ALONG,
+    frequency_map_across: FREQUENCY_MAP_ACROSS, map_centre_x: MAP_CENTRE_X, map_centre_z: MAP_CENTRE_Z, map_width: MAP_WIDTH, map_height: MAP_HEIGHT, ring_count: RING_COUNT,
     ring_dim: RING_DIM, seed: SEED, particle_capacity: PARTICLE_CAPACITY, valid_cell_capacity: VALID_CELL_CAPACITY,
     density: DENSITY, phase: PHASE, weather_phase: WEATHER_PHASE, evolving: EVOLVING, lean_count: LEAN_COUNT,
+    reserved: RESERVED_A,
 });
 
 impl GridParams {
@@ -165,11 +170,12 @@ impl GridDesign {
         match &clouds.coverage {
             Coverage::Uniform(coverage) => fixed.coverage = *coverage,
             Coverage::Map(map) => {
-                // Centred on the world's origin; the first texel's centre lies half a texel inside the corner.
                 let texel = f64::from(map.extent) / f64::from(map.width);
-                let first = |count: u32| (0.5 - f64::from(count) / 2.0) * texel / step;
-                fixed.frequency_map = density::frequency(texel, step);
-                (fixed.map_first_x, fixed.map_first_z) = (first(map.width) as i32, first(map.height) as i32);
+                let frequency = f64::from(density::frequency(texel, step));
+                let (sin, cos) = map.rotation.to_radians().sin_cos();
+                fixed.frequency_map_along = (frequency * cos).round() as i32;
+                fixed.frequency_map_across = (frequency * sin).round() as i32;
+                [fixed.map_centre_x, fixed.map_centre_z] = map.offset.map(|metres| (metres / step).round() as i32);
                 (fixed.map_width, fixed.map_height) = (map.width, map.height);
             }
         }

@@ -167,8 +167,8 @@ pub enum Coverage {
     Map(CoverageMap),
 }
 
-/// Coverage as a picture seen from above, centred on the world's origin and repeated: columns grow to the east (+x), rows
-/// to the south (+z), so that it reads as a map.
+/// Coverage as a picture seen from above and repeated: unturned, columns grow to the east (+x) and rows to the south (+z), so
+/// that it reads as a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoverageMap {
     /// Columns.
@@ -179,6 +179,10 @@ pub struct CoverageMap {
     pub values: Vec<f32>,
     /// What the picture's width measures in the world [m]; the height follows from square texels.
     pub extent: f32,
+    /// Where the picture's centre lies, east (+x) and south (+z) of the world's origin [m].
+    pub offset: [f64; 2],
+    /// Compass direction that the picture's top points to [degrees]: 90 turns it clockwise, its top to the east.
+    pub rotation: f64,
 }
 
 impl Default for Clouds {
@@ -299,6 +303,9 @@ impl CoverageMap {
         if let Some(bad) = self.values.iter().find(|v| !(0.0..=1.0).contains(*v)) {
             return Err(Error::invalid("clouds.coverage_map", bad, "values from 0 to 1"));
         }
-        check::within("clouds.coverage_map_extent", self.extent, 1.0e2..=1.0e7, "m")
+        check::within("clouds.coverage_map_extent", self.extent, 1.0e2..=1.0e7, "m")?;
+        let coordinates = -check::MAX_COORDINATE..=check::MAX_COORDINATE;
+        check::each_within("clouds.coverage_map_offset", self.offset, coordinates, "m")?;
+        check::within("clouds.coverage_map_rotation", self.rotation, -360.0..=360.0, "degrees")
     }
 }

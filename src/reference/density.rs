@@ -54,6 +54,17 @@ pub fn walk(start: u32, pace: u32, phase: u32) -> u32 {
     (if at >= 0x8000_0000 { !at } else { at }) >> 7
 }
 
+/// The point of a lattice that is turned: its axes point along (`along`, `across`) and (−`across`, `along`), in 2⁻³² lattice
+/// cells per step, and the position 0 lies `half_cells` half cells from its first point. Exact, as [`lattice_point`].
+#[must_use]
+pub fn turned_lattice_point(position: [i32; 2], along: i32, across: i32, half_cells: [i32; 2]) -> LatticePoint {
+    let [x, z] = position.map(i64::from);
+    let (along, across) = (i64::from(along), i64::from(across));
+    let axis = |half_cells: i32, product: i64| product.wrapping_add(i64::from(half_cells) << 31);
+    let sums = [axis(half_cells[0], x * along + z * across), axis(half_cells[1], z * along - x * across)];
+    LatticePoint { cell: sums.map(|s| (s >> 32) as i32), fraction: sums.map(|s| unit_float(s as u32)) }
+}
+
 fn quintic(f: f32) -> f32 {
     let cube = (f * f) * f;
     let slope = f * 6.0 - 15.0;
@@ -171,6 +182,29 @@ mod tests {
         let p = lattice_point([-1, 4096 * 500_000 + 1024], frequency);
         assert_eq!(p.cell, [-1, 500_000]);
         assert_eq!(p.fraction, [4095.0 / 4096.0, 0.25]);
+    }
+
+    #[test]
+    fn a_turned_lattice_point_is_the_rotation_about_its_centre() {
+        // 4096 steps a cell; 5 × 4 points, so that the centre lies on a point along one axis and between two along the other.
+        let frequency = f64::from(1 << 20);
+        for degrees in [0.0_f64, 37.0, 90.0, -135.0, 360.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let (along, across) = ((frequency * cos).round() as i32, (frequency * sin).round() as i32);
+            for position in [[0, 0], [700_000, -123_456], [-5, 4096], [-70_000_000, 70_000_000]] {
+                let p = turned_lattice_point(position, along, across, [4, 3]);
+                let [x, z] = position.map(|axis| f64::from(axis) / 4096.0);
+                let expected = [2.0 + x * cos + z * sin, 1.5 + z * cos - x * sin];
+                for axis in 0..2 {
+                    let at = f64::from(p.cell[axis]) + f64::from(p.fraction[axis]);
+                    // Half a unit of either frequency's rounding over 7e7 steps, and 24 bits of fraction.
+                    let bound = 1.2e-7 + 7.0e7 / 4_294_967_296.0;
+                    assert!((at - expected[axis]).abs() < bound, "{degrees}°, {position:?}: {at} {expected:?}");
+                }
+            }
+        }
+        let straight = turned_lattice_point([4096 * 7 + 1024, -4096], 1 << 20, 0, [0, 0]);
+        assert_eq!(straight, lattice_point([4096 * 7 + 1024, -4096], 1 << 20));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use crate::grid::params::{GridParams, LAYER_CAPACITY};
 use crate::reference::density::{
-    coverage_field, hash_lattice, lattice_point, pcg, signed_float, turret_field, unit_float,
+    coverage_field, hash_lattice, pcg, signed_float, turned_lattice_point, turret_field, unit_float,
 };
 use crate::shared::Particle;
 
@@ -95,8 +95,9 @@ pub fn coverage_at(place: &CellPlace, map: &[f32], p: &GridParams) -> f32 {
         return p.coverage;
     }
     let position = cell_position(place, p);
-    let relative = [position[0].wrapping_sub(p.map_first_x), position[1].wrapping_sub(p.map_first_z)];
-    let at = lattice_point(relative, p.frequency_map);
+    let relative = [position[0].wrapping_sub(p.map_centre_x), position[1].wrapping_sub(p.map_centre_z)];
+    let half_texels = [p.map_width as i32 - 1, p.map_height as i32 - 1];
+    let at = turned_lattice_point(relative, p.frequency_map_along, p.frequency_map_across, half_texels);
     let texel = |dx: i32, dz: i32| {
         let x = at.cell[0].wrapping_add(dx).rem_euclid(p.map_width as i32) as usize;
         let z = at.cell[1].wrapping_add(dz).rem_euclid(p.map_height as i32) as usize;

@@ -31,9 +31,17 @@ pub struct Override {
 /// [`Error::File`] when a file cannot be read, [`Error::FileAt`] for a fault at a known place of a file,
 /// [`Error::InvalidParam`] for one in an override, [`Error::Unsupported`] for a choice that this version lacks.
 pub fn load(path: &Path, overrides: &[Override]) -> Result<Params> {
+    load_noting(path, overrides, &mut |_| ())
+}
+
+/// As [`load`]; `note` is told, a sentence at a time, what the scene's files hold in vain.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_noting(path: &Path, overrides: &[Override], note: &mut dyn FnMut(&str)) -> Result<Params> {
     let bytes = std::fs::read(path).map_err(|error| Error::file(path, format!("cannot be read: {error}")))?;
     let text = String::from_utf8(bytes).map_err(|_| Error::file(path, "is not UTF-8 text"))?;
-    parse(&text, path, overrides)
+    parse_noting(&text, path, overrides, note)
 }
 
 /// As [`load`], with the text of the scene file at `path` given.
@@ -41,11 +49,15 @@ pub fn load(path: &Path, overrides: &[Override]) -> Result<Params> {
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str, path: &Path, overrides: &[Override]) -> Result<Params> {
+    parse_noting(text, path, overrides, &mut |_| ())
+}
+
+fn parse_noting(text: &str, path: &Path, overrides: &[Override], note: &mut dyn FnMut(&str)) -> Result<Params> {
     let overrides = source::override_texts(text.len(), overrides)?;
     let source = source::Source::new(text, path, &overrides)?;
     let scene: schema::Scene = source.read()?;
     let base = path.parent().unwrap_or(Path::new(""));
-    let params = scene.into_params(base).map_err(|error| source.locate(error))?;
+    let params = scene.into_params(base, note).map_err(|error| source.locate(error))?;
     params.validate().map_err(|error| source.locate(error))?;
     Ok(params)
 }

@@ -60,6 +60,8 @@ struct CloudKeys {
     coverage: Option<f32>,
     coverage_map: Option<PathBuf>,
     coverage_map_extent: Option<f32>,
+    coverage_map_offset: Option<[f64; 2]>,
+    coverage_map_rotation: Option<f64>,
     sigma_t: Option<f32>,
     albedo: Option<f32>,
     phase: Option<String>,
@@ -161,14 +163,14 @@ fn one_of<T: Copy>(field: &str, name: &str, names: &[(&str, T)]) -> Result<T> {
 }
 
 impl Scene {
-    /// The parameters that this scene stands for; files are relative to `base`.
-    pub fn into_params(self, base: &Path) -> Result<Params> {
+    /// The parameters that this scene stands for; files are relative to `base`. `note` is told what files hold in vain.
+    pub fn into_params(self, base: &Path, note: &mut dyn FnMut(&str)) -> Result<Params> {
         let camera = self.camera.into_params()?;
         Ok(Params {
             animation: self.animation.into_params(camera.aim)?,
             camera,
             sun: self.sun.into_params()?,
-            clouds: self.clouds.into_params(base)?,
+            clouds: self.clouds.into_params(base, note)?,
             quality: self.quality.into_params()?,
             sky: self.sky.into_params(base)?,
             film: self.film.into_params()?,
@@ -245,7 +247,7 @@ fn unix_seconds(time: Datetime) -> Result<f64> {
 }
 
 impl CloudKeys {
-    fn into_params(self, base: &Path) -> Result<Clouds> {
+    fn into_params(self, base: &Path, note: &mut dyn FnMut(&str)) -> Result<Clouds> {
         let mut clouds = Clouds::default();
         set_named(&mut clouds.lighting, self.lighting.as_ref(), |name| lookup(LIGHTINGS, "clouds.lighting", name))?;
         set_named(&mut clouds.style, self.style.as_ref(), |name| lookup(STYLES, "clouds.style", name))?;
@@ -262,15 +264,23 @@ impl CloudKeys {
         clouds.xi = self.xi.unwrap_or(clouds.transfer.xi());
         set(&mut clouds.smoothing, self.smoothing);
         set(&mut clouds.particle_cutoff, self.particle_cutoff);
-        clouds.coverage = self.coverage(base)?;
+        clouds.coverage = self.coverage(base, note)?;
         clouds.source = self.source(base)?;
         Ok(clouds)
     }
 
-    fn coverage(&self, base: &Path) -> Result<Coverage> {
+    fn coverage(&self, base: &Path, note: &mut dyn FnMut(&str)) -> Result<Coverage> {
         let Some(file) = &self.coverage_map else {
-            if let Some(extent) = self.coverage_map_extent {
-                return Err(Error::invalid("clouds.coverage_map_extent", extent, "clouds.coverage_map beside it"));
+            let given = [
+                ("extent", self.coverage_map_extent.map(|v| v.to_string())),
+                ("offset", self.coverage_map_offset.map(|v| format!("{v:?}"))),
+                ("rotation", self.coverage_map_rotation.map(|v| v.to_string())),
+            ];
+            for (key, value) in given {
+                if let Some(value) = value {
+                    let key = format!("clouds.coverage_map_{key}");
+                    return Err(Error::invalid(key, value, "clouds.coverage_map beside it"));
+                }
             }
             return Ok(self.coverage.map_or(Clouds::default().coverage, Coverage::Uniform));
         };
@@ -279,7 +289,9 @@ impl CloudKeys {
         }
         // 200 km: the longer of the two wavelengths of the procedural coverage.
         let extent = self.coverage_map_extent.unwrap_or(2.0e5);
-        Ok(Coverage::Map(coverage::load(&base.join(file), extent)?))
+        let place =
+            (extent, self.coverage_map_offset.unwrap_or_default(), self.coverage_map_rotation.unwrap_or_default());
+        Ok(Coverage::Map(coverage::load(&base.join(file), place, note)?))
     }
 
     fn source(self, base: &Path) -> Result<Source> {

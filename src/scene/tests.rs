@@ -86,6 +86,15 @@ fn faults_point_at_line_and_column() {
         ),
         ("[sun]\ntime = 2026-06-21T12:00:00Z", "sky.toml:2:8: sun.time = 2026-06-21T12:00:00Z: expected sun.latitude"),
         ("[clouds]\nsource = \"particles\"", "sky.toml:2:10: clouds.source = particles: expected clouds.file or"),
+        (
+            "[clouds]\ncoverage_map_offset = [1,2]",
+            "sky.toml:2:23: clouds.coverage_map_offset = [1.0, 2.0]: expected clouds.",
+        ),
+        ("[clouds]\ncoverage_map_rotation = 5", "sky.toml:2:25: clouds.coverage_map_rotation = 5: expected clouds."),
+        (
+            "[clouds]\ncoverage_map_offset = [1]",
+            "sky.toml:2:23: clouds.coverage_map_offset = [1]: expected a list of 2",
+        ),
         ("[clouds\n", "sky.toml:1:8: not TOML: "),
         ("a = 1\na = 2", "sky.toml:2:1: not TOML: duplicate key"),
     ];
@@ -153,6 +162,13 @@ fn files_are_relative_to_the_scene() {
     std::fs::write(&scene, "[clouds]\ncoverage_map = \"map.png\"\ncoverage_map_extent = 5e4\n").unwrap();
     let Coverage::Map(map) = load(&scene, &[]).unwrap().clouds.coverage else { panic!("not a map") };
     assert_eq!((map.width, map.height, map.values, map.extent), (2, 1, vec![0.0, 1.0], 5.0e4));
+    assert_eq!((map.offset, map.rotation), ([0.0, 0.0], 0.0));
+    let bad = [("offset = [0, 2e7]", "offset[1] = 20000000: expected"), ("rotation = 361", "rotation = 361: expected")];
+    for (key, expected) in bad {
+        std::fs::write(&scene, format!("[clouds]\ncoverage_map = \"map.png\"\ncoverage_map_{key}\n")).unwrap();
+        let message = load(&scene, &[]).unwrap_err().to_string();
+        assert!(message.contains("sky.toml:3:") && message.contains(expected), "{message}");
+    }
 
     std::fs::write(dir.path().join("cloud.csv"), "0,0,0,1,1,1,0,0,0,1,1\n0,0,0,1,1,1,0,0,0,1\n").unwrap();
     std::fs::write(&scene, "[clouds]\nsource = \"particles\"\nfile = \"cloud.csv\"\n").unwrap();
