@@ -81,6 +81,9 @@ fn a_sequence_leaves_pictures_metrics_and_a_report() {
     assert_eq!((&m["frames"], &m["passed"], &m["reference"]["used"]), (&[2, 4].into(), &true.into(), &"oracle".into()));
     // The same numbers out of the files.
     let out = directory.path().join("out");
+    let layers = std::fs::read(out.join("layers.0002.exr")).unwrap();
+    let holds = |name: &[u8]| layers.windows(name.len()).any(|bytes| bytes == name);
+    assert!(holds(b"reference_oracle.R\0") && holds(b".B\0") && !holds(b"\0R\0"));
     let pixels = |name: &str| image::open(out.join(name)).unwrap().into_rgb32f().into_raw();
     let (mut sum, mut greatest, mut values) = (0.0, 0.0f64, 0.0);
     let (mut pops, mut pairs) = (0.0, 0.0);

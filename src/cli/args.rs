@@ -1,9 +1,10 @@
 //! The command line: what can be said, in one place.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use welkin::output::{ExrCompression, ExrOptions, ExrType};
 use welkin::params::Blend;
 
 /// Cumulus skies in Vulkan: a scene file goes in, a picture comes out.
@@ -116,12 +117,68 @@ pub struct RenderArgs {
     /// Validation is on while statistics are taken, where the layer is installed.
     #[arg(long, value_name = "FILE.json", num_args = 0..=1, default_missing_value = "-", value_parser = parse_stats)]
     pub stats: Option<PathBuf>,
-    /// Write the clouds' transmittance beside the picture, as OUT.transmittance.npy
+    /// Write the clouds' transmittance beside the picture, as OUT.transmittance.npy, and as a layer of an EXR
     #[arg(long)]
     pub aux: bool,
     /// Write PNG with 16 bits a channel
     #[arg(long)]
     pub png16: bool,
+    /// Compression of EXR
+    #[arg(long, value_enum, value_name = "METHOD", default_value_t)]
+    pub exr_compression: ExrCompressionArg,
+    /// Type of EXR's colour channels; other layers are floats
+    #[arg(long, value_enum, value_name = "TYPE", default_value_t)]
+    pub exr_type: ExrTypeArg,
+    /// Owner that an EXR names
+    #[arg(long, value_name = "NAME")]
+    pub exr_owner: Option<String>,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ExrCompressionArg {
+    /// Deflate, 16 lines at a time
+    #[default]
+    Zip,
+    /// Deflate, line by line
+    Zips,
+    /// Runs of equal bytes
+    Rle,
+    /// Wavelets
+    Piz,
+    /// None
+    None,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ExrTypeArg {
+    /// 16 bits, up to 65504
+    Half,
+    /// 32 bits
+    #[default]
+    Float,
+}
+
+impl RenderArgs {
+    /// How EXRs of `scene` are written.
+    pub fn exr_options(&self, scene: &Path) -> ExrOptions {
+        let words = [scene.display().to_string()].into_iter().chain(self.picture.scene.set.iter().cloned());
+        ExrOptions {
+            compression: match self.exr_compression {
+                ExrCompressionArg::Zip => ExrCompression::Zip,
+                ExrCompressionArg::Zips => ExrCompression::Zips,
+                ExrCompressionArg::Rle => ExrCompression::Rle,
+                ExrCompressionArg::Piz => ExrCompression::Piz,
+                ExrCompressionArg::None => ExrCompression::None,
+            },
+            colour: match self.exr_type {
+                ExrTypeArg::Half => ExrType::Half,
+                ExrTypeArg::Float => ExrType::Float,
+            },
+            owner: self.exr_owner.clone(),
+            scene: Some(words.collect::<Vec<_>>().join(" ")),
+            aux: self.aux,
+        }
+    }
 }
 
 #[derive(Args, Debug)]
@@ -562,6 +619,10 @@ mod tests {
         assert_eq!((args.picture.quality, args.blend), (Some(QualityArg::Low), Some(Blend::Interlock(4))));
         assert_eq!(args.frames, Some(FrameRange(3..7)));
         assert_eq!((args.stats, args.picture.scene.set.len()), (Some("s.json".into()), 2));
+        let args = render("sky.toml --set a.b=1 --exr-compression piz --exr-type half --exr-owner me --aux").unwrap();
+        let options = args.exr_options(Path::new("sky.toml"));
+        assert_eq!((options.compression, options.colour, options.aux), (ExrCompression::Piz, ExrType::Half, true));
+        assert_eq!((options.owner.as_deref(), options.scene.as_deref()), (Some("me"), Some("sky.toml a.b=1")));
     }
 
     #[test]
@@ -604,6 +665,8 @@ mod tests {
         }
         let message = render("a.toml --blend glass").unwrap_err();
         assert!(message.contains("'glass' for '--blend") && message.contains("one of auto, interlock"), "{message}");
+        assert!(render("a.toml --exr-compression lzw").unwrap_err().contains("zip, zips, rle, piz, none"));
+        assert!(render("a.toml --exr-type double").unwrap_err().contains("half, float"));
         assert!(render("a.toml --quality ultra").unwrap_err().contains("low, medium, high"));
     }
 }

@@ -54,6 +54,7 @@ fn render(args: &RenderArgs, job: &Job<'_>, device: &mut Device) -> Result<Stats
     let size = args.picture.size;
     let mut session = Session::open(device, &job.params, &args.picture)?;
     let depth = if args.png16 { PngDepth::Sixteen } else { PngDepth::Eight };
+    let exr = args.exr_options(job.scene);
     let frames = args.frames.as_ref().map_or(0..1, |range| range.0.clone());
     let mut progress =
         (frames.len() > 1).then(|| Progress::start(job.scene.display().to_string(), frames.len() as u64));
@@ -73,7 +74,7 @@ fn render(args: &RenderArgs, job: &Job<'_>, device: &mut Device) -> Result<Stats
         let params = job.params.at_frame(frame);
         params.validate()?;
         let made = session.frame(device, &params)?;
-        made.picture.write(&output, depth)?;
+        made.picture.write_with(&output, depth, &exr)?;
         if args.aux {
             made.picture.write_transmittance(&transmittance_path(&output))?;
         }

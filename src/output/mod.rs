@@ -4,6 +4,7 @@
 //! `.exr` and `.npy` hold linear scene radiance before tone mapping; `.png` holds the toned picture.
 
 mod atomic;
+mod exr;
 mod npy;
 mod picture;
 mod stats;
@@ -13,6 +14,7 @@ mod vdb;
 use std::path::Path;
 
 pub use atomic::{AtomicFile, write_atomic};
+pub use exr::{ExrChannel, ExrCompression, ExrOptions, ExrType, colour as exr_colour, write as write_exr};
 pub use npy::NpyVolume;
 pub(crate) use picture::encode_png;
 pub use picture::{Format, Picture, PngDepth, numbered, transmittance_path};

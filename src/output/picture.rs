@@ -1,12 +1,12 @@
 //! A finished picture and its files.
 
-use std::io::{Cursor, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 
+use super::exr::{self, ExrChannel, ExrOptions};
 use super::{npy, write_atomic};
 use crate::{Error, Result};
 
@@ -30,7 +30,7 @@ pub struct Picture {
 pub enum Format {
     /// PNG, sRGB: the toned picture.
     Png,
-    /// OpenEXR, three f32 channels: radiance.
+    /// OpenEXR: radiance, and more if [`ExrOptions`] say so.
     Exr,
     /// NumPy, f32, height × width × 3: radiance.
     Npy,
@@ -68,6 +68,14 @@ impl Picture {
     /// # Errors
     /// [`Error::File`] when a value is not finite or the file cannot be written; nothing is left behind.
     pub fn write(&self, path: &Path, depth: PngDepth) -> Result<()> {
+        self.write_with(path, depth, &ExrOptions::default())
+    }
+
+    /// As [`Self::write`], an EXR as `options` say.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_with(&self, path: &Path, depth: PngDepth, options: &ExrOptions) -> Result<()> {
         let format = Format::of(path)?;
         self.check(path)?;
         match (format, depth) {
@@ -75,7 +83,7 @@ impl Picture {
             (Format::Png, PngDepth::Sixteen) => {
                 self.write_png(path, ExtendedColorType::Rgb16, bytemuck::cast_slice(&self.codes_16()))
             }
-            (Format::Exr, _) => self.write_exr(path),
+            (Format::Exr, _) => self.write_exr(path, options),
             (Format::Npy, _) => npy::write(path, &self.shape(&[3]), self.radiance.iter().flatten().copied()),
         }
     }
@@ -155,13 +163,13 @@ impl Picture {
         Ok(bytes)
     }
 
-    fn write_exr(&self, path: &Path) -> Result<()> {
-        let mut encoded = Cursor::new(Vec::new()); // The encoder seeks.
-        let bytes = bytemuck::cast_slice(&self.radiance);
-        OpenExrEncoder::new(&mut encoded)
-            .write_image(bytes, self.width, self.height, ExtendedColorType::Rgb32F)
-            .map_err(|error| Error::file(path, format!("cannot be encoded: {error}")))?;
-        write_atomic(path, |file| file.write_all(encoded.get_ref()))
+    fn write_exr(&self, path: &Path, options: &ExrOptions) -> Result<()> {
+        let mut channels = exr::colour("", &self.radiance);
+        if let Some(transmittance) = self.transmittance.as_ref().filter(|_| options.aux) {
+            let values = Box::new(transmittance.iter().copied());
+            channels.push(ExrChannel { name: "transmittance.Y".into(), values, colour: false });
+        }
+        exr::write(path, [self.width, self.height], channels, options)
     }
 }
 

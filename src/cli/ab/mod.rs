@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use welkin::compare::{Difference, FrameMetrics, HeatMap, Report, ReportSide, Scale, Series, Summary};
-use welkin::output::{BlendStats, DeviceStats, PassStats, Picture, PngDepth, numbered, write_json};
+use welkin::output::{
+    BlendStats, DeviceStats, ExrOptions, PassStats, Picture, PngDepth, exr_colour, numbered, write_exr, write_json,
+};
 use welkin::params::Params;
 use welkin::{Error, Result};
 
@@ -124,8 +126,10 @@ pub fn run(args: &AbArgs) -> Result<bool> {
         let [a, b] = &pictures;
         let number = args.frames.is_some().then_some(frame);
         out.write(
+            &scene,
             number,
             [("a", a), ("b", b), ("reference", &truth.picture)],
+            [&compared[0], &compared[1], &judge.choice().used],
             [("a", &differences[0]), ("b", &differences[1])],
         )?;
         report.add(frame, [a, b, &truth.picture], [&differences[0], &differences[1]])?;
@@ -206,8 +210,10 @@ impl Places {
     /// A frame's pictures and heat maps; `number` is that of a frame of a sequence.
     fn write(
         &self,
+        scene: &str,
         number: Option<u32>,
         pictures: [(&str, &Picture); 3],
+        modes: [&str; 3],
         differences: [(&str, &Difference); 2],
     ) -> Result<()> {
         let file = |name: String| number.map_or(self.file(&name), |frame| numbered(&self.file(&name), frame));
@@ -215,7 +221,15 @@ impl Places {
             picture.write(&file(format!("{name}.png")), PngDepth::Eight)?;
             picture.write(&file(format!("{name}.exr")), PngDepth::Eight)?;
         }
-        let width = pictures[0].1.width;
+        // All three in one, a layer each, named after its part and its mode: a_interlock.R.
+        let layers = pictures.iter().zip(modes);
+        let channels = layers.flat_map(|((name, picture), mode)| {
+            exr_colour(&format!("{name}_{}", mode.replace([':', '.', ' '], "_")), &picture.radiance)
+        });
+        let [(_, Picture { width, height, .. }), ..] = pictures;
+        let options = ExrOptions { scene: Some(scene.to_owned()), ..ExrOptions::default() };
+        write_exr(&file("layers.exr".into()), [*width, *height], channels.collect(), &options)?;
+        let width = *width;
         for (name, difference) in differences {
             HeatMap::new(Scale::Flip, difference, width).write(&file(format!("flip_{name}.png")))?;
             HeatMap::new(Scale::Radiance, difference, width).write(&file(format!("difference_{name}.png")))?;
