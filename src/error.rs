@@ -43,6 +43,14 @@ pub enum Error {
         /// The device or component that lacks it.
         by: String,
     },
+    /// The system lacks a part of Vulkan.
+    #[error("{missing}: {help}")]
+    NoDriver {
+        /// What it lacks, in a sentence.
+        missing: String,
+        /// What to do about it.
+        help: String,
+    },
     /// A parameter is outside what is accepted.
     #[error("{field} = {value}: expected {expected}")]
     InvalidParam {

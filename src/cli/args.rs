@@ -39,6 +39,35 @@ pub enum Command {
     Conform(ConformArgs),
     /// Measure everything about a device within minutes: what scripts/gpu-check starts (docs/performance)
     GpuCheck(GpuCheckArgs),
+    /// Unpack a Vulkan driver for the CPU, without root, on a system with apt (docs/drivers.md)
+    Setup(SetupArgs),
+    /// Print the manual page, or write one for each command
+    Man(ManArgs),
+    /// Print completions for a shell
+    Completions(CompletionsArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct SetupArgs {
+    /// Directory to unpack into; made if need be [default: welkin in the user's data directory]
+    ///
+    /// Another than the default is found by naming it in WELKIN_PREFIX_DIR.
+    #[arg(long, value_name = "DIR")]
+    pub dir: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct ManArgs {
+    /// Directory for welkin.1 and a page for each command; made if need be
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct CompletionsArgs {
+    /// Whose
+    #[arg(value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
 }
 
 #[derive(Args, Debug)]

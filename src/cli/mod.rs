@@ -9,13 +9,16 @@ mod conform;
 mod devices;
 mod gpu_check;
 mod interrupt;
+mod manual;
 mod places;
 mod precompute;
+mod prefix;
 mod progress;
 mod reference;
 mod render;
 mod scenes;
 mod session;
+mod setup;
 mod summary;
 mod tables;
 mod validation;
@@ -62,6 +65,9 @@ pub fn main() -> ExitCode {
         Command::Accuracy(args) => accuracy::run(args).map(Outcome::done),
         Command::Conform(args) => conform::run(args).map(Outcome::of),
         Command::GpuCheck(args) => gpu_check::run(args),
+        Command::Setup(args) => setup::run(args).map(Outcome::done),
+        Command::Man(args) => manual::man(args).map(Outcome::done),
+        Command::Completions(args) => manual::completions(args).map(Outcome::done),
     };
     let validation = validation::verdict();
     match outcome.and_then(|outcome| validation.map(|()| outcome)) {
@@ -69,7 +75,11 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Failed) => ExitCode::from(1),
         Ok(Outcome::Stopped(signal)) => ExitCode::from(signal.status()),
         Err(error) => {
+            let error = prefix::start_again(error);
             eprintln!("welkin: error: {error}");
+            if matches!(error, Error::NoDriver { .. }) {
+                eprintln!("welkin: or, without root on a system with apt: welkin setup");
+            }
             ExitCode::from(2)
         }
     }

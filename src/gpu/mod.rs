@@ -5,6 +5,7 @@
 //! hands over its own through [`Gpu::from_raw`].
 
 mod access;
+mod advice;
 mod buffer;
 mod capabilities;
 mod device;

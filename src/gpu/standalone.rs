@@ -1,5 +1,6 @@
 //! A device of our own, for the command line, the tests and the examples. An engine does not need this file.
 
+use super::advice::advice;
 use super::{Capabilities, DeviceFeatures, Feature, Frames, Gpu, PipelineFactory, RawDevice};
 use crate::{Error, Result};
 use ash::vk;
@@ -67,7 +68,8 @@ impl Standalone {
     /// Opens a device.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] if there is no Vulkan loader, no usable device, or no validation layer when asked for;
+    /// [`Error::NoDriver`] if there is no Vulkan loader, driver or device, [`Error::Unsupported`] if there is no usable one, or
+    /// no validation layer when asked for;
     /// [`Error::InvalidParam`] if no device has the name or index asked for.
     pub fn new(options: Options) -> Result<Self> {
         let instance = Arc::new(Instance::new(options.validation)?);
@@ -163,9 +165,9 @@ struct Instance {
 impl Instance {
     fn new(validation: bool) -> Result<Self> {
         // SAFETY: loads the Vulkan loader, which runs its initialisers.
-        let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::Unsupported {
-            needed: format!("a Vulkan loader ({error})"),
-            by: "this system (scripts/setup installs one)".to_owned(),
+        let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::NoDriver {
+            missing: format!("this system has no Vulkan loader ({error})"),
+            help: advice(),
         })?;
         if validation && !has_layer(&entry) {
             return Err(Error::Unsupported {
@@ -220,10 +222,9 @@ impl Instance {
         }
         // SAFETY: every pointer in the description is alive.
         let raw = unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER => Error::Unsupported {
-                needed: "a Vulkan driver".to_owned(),
-                by: "this system (scripts/setup installs one)".to_owned(),
-            },
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
+                Error::NoDriver { missing: "this system has a Vulkan loader, but no driver".to_owned(), help: advice() }
+            }
             result => Error::Vulkan { call: "vkCreateInstance", pass: "the instance".to_owned(), result },
         })?;
         let mut instance = Self { debug: None, raw, messages: Messages::default(), _entry: entry };
@@ -297,7 +298,7 @@ impl Drop for Device {
 /// Index of the device that `wanted` names, by part of its name or by its index; of the best without a wish.
 ///
 /// # Errors
-/// [`Error::Unsupported`] if there is no device at all, [`Error::InvalidParam`] if none is meant.
+/// [`Error::NoDriver`] if there is no device at all, [`Error::InvalidParam`] if none is meant.
 pub fn find(devices: &[Capabilities], wanted: Option<&str>) -> Result<usize> {
     let Some(wanted) = wanted else {
         let rank = |c: &Capabilities| {
@@ -305,9 +306,9 @@ pub fn find(devices: &[Capabilities], wanted: Option<&str>) -> Result<usize> {
             (!c.missing.is_empty(), kind, c.supports(Feature::FragmentShaderInterlock).is_err())
         };
         let best = devices.iter().enumerate().min_by_key(|(_, c)| rank(c));
-        return best.map(|(index, _)| index).ok_or_else(|| Error::Unsupported {
-            needed: "a Vulkan device".to_owned(),
-            by: "this system (scripts/setup installs a software one)".to_owned(),
+        return best.map(|(index, _)| index).ok_or_else(|| Error::NoDriver {
+            missing: "this system has a Vulkan driver, but no device for it".to_owned(),
+            help: advice(),
         });
     };
     let index = wanted.parse::<usize>().ok();
