@@ -230,7 +230,7 @@ mod tests {
         assert_eq!(text(&header.own_attributes.owner).as_deref(), Some("me"));
         let software = text(&header.own_attributes.software_name).unwrap();
         assert_eq!(software, format!("Welkin {}", env!("CARGO_PKG_VERSION")));
-        let scene = header.own_attributes.other.iter().find(|(name, _)| name.to_string() == "scene");
+        let scene = header.own_attributes.other.iter().find(|(name, _)| **name == *"scene");
         assert_eq!(scene.unwrap().1, &AttributeValue::Text("sky.toml sun.azimuth=3".into()));
         let space = header.shared_attributes.chromaticities.unwrap();
         // ITU-R BT.709, as sRGB.
