@@ -1,5 +1,6 @@
-//! Compiles every entry file under `glsl/`, reflects the SPIR-V, and writes two tables for the crate:
-//! `shaders.rs` (one typed module per program) and `layout.rs` (offset of every member of every shared struct).
+//! Compiles every entry file under `glsl/`, reflects the SPIR-V, and writes three tables for the crate:
+//! `shaders.rs` (one typed module per program), `layout.rs` (offset of every member of every shared struct) and
+//! `constants.rs` (the numbers that shaders have names for).
 //!
 //! Entry files end in `.comp`, `.vert` or `.frag`; `.glsl` files are includes. A fragment shader names its vertex
 //! shader in a line `// vertex: <path>`, and the two become one program. An entry file with a line `// lighting: each` is
@@ -10,6 +11,8 @@
 
 #[path = "build/compile.rs"]
 mod compile;
+#[path = "build/constants.rs"]
+mod constants;
 #[path = "build/emit.rs"]
 mod emit;
 #[path = "build/reflect.rs"]
@@ -28,6 +31,12 @@ fn main() {
     let mut entries = Vec::new();
     collect(&root, &root, &mut entries);
     entries.sort();
+    let texts: Vec<_> = entries
+        .iter()
+        .map(|name| (name.clone(), fs::read_to_string(root.join(name)).expect("glsl/ is readable")))
+        .collect();
+    fs::write(out.join("constants.rs"), constants::constants(&texts)).expect("OUT_DIR is writable");
+    entries.retain(|name| !name.ends_with(".glsl"));
     let lightings = lightings(&root);
 
     let mut modules = Vec::new();
@@ -84,13 +93,13 @@ fn lightings(root: &Path) -> Vec<String> {
     names
 }
 
-/// Every entry file below `folder`, as a path relative to `root` with forward slashes.
+/// Every file of GLSL below `folder`, as a path relative to `root` with forward slashes.
 fn collect(root: &Path, folder: &Path, entries: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("glsl/ is readable").flatten() {
         let path = entry.path();
         if path.is_dir() {
             collect(root, &path, entries);
-        } else if matches!(path.extension().and_then(|e| e.to_str()), Some("comp" | "vert" | "frag")) {
+        } else if matches!(path.extension().and_then(|e| e.to_str()), Some("comp" | "vert" | "frag" | "glsl")) {
             let relative = path.strip_prefix(root).expect("below glsl/");
             let parts: Vec<_> = relative.components().map(|part| part.as_os_str().to_string_lossy()).collect();
             entries.push(parts.join("/"));

@@ -28,12 +28,12 @@ pub enum Error {
         last_pass: String,
     },
     /// Memory for `what` could not be had.
-    #[error("out of memory: {bytes} bytes for {what}")]
+    #[error("out of memory: {}{what}", bytes.map(|bytes| format!("{bytes} bytes for ")).unwrap_or_default())]
     OutOfMemory {
         /// Name of the resource.
         what: String,
-        /// Size asked for [bytes].
-        bytes: u64,
+        /// Size asked for [bytes]; none where Vulkan is not told one (pipelines, descriptors, command buffers).
+        bytes: Option<u64>,
     },
     /// The device, driver or build lacks something that was asked for.
     #[error("{needed} is not supported by {by}")]
@@ -113,5 +113,12 @@ mod tests {
     fn an_invalid_parameter_names_field_value_and_expectation() {
         let text = Error::invalid("clouds.coverage", -1.0, "a number from 0 to 1").to_string();
         assert_eq!(text, "clouds.coverage = -1: expected a number from 0 to 1");
+    }
+
+    #[test]
+    fn out_of_memory_tells_how_much_was_asked_for_where_that_is_known() {
+        let error = |bytes| Error::OutOfMemory { what: "tile nodes (vkCreateBuffer)".into(), bytes }.to_string();
+        assert_eq!(error(Some(4096)), "out of memory: 4096 bytes for tile nodes (vkCreateBuffer)");
+        assert_eq!(error(None), "out of memory: tile nodes (vkCreateBuffer)");
     }
 }

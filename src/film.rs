@@ -5,6 +5,7 @@ use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampler};
 use crate::params::{self, Precision, SkyModel, ToneCurve};
 use crate::shaders::{film_composite_comp as composite, film_tonemap_comp as tonemap};
 use crate::shared::assert_layout;
+use crate::shared::constants::film_tonemap_glsl as constants;
 use crate::targets::cloud_format;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -86,8 +87,16 @@ impl Film {
     /// Tones the composited scene.
     pub fn record_tonemap(&self, rec: &mut Recorder<'_>, film: &params::Film, model: SkyModel) -> Result<()> {
         let bindings = tonemap::Bindings { scene: self.scene.sampled(Sampler::NearestClamp), picture: &self.picture };
-        let push = TonemapPush { gain: gain(film, model), curve: u32::from(film.curve == ToneCurve::Linear) };
+        let push = TonemapPush { gain: gain(film, model), curve: curve(film.curve) };
         let [width, height, _] = self.picture.extent();
         rec.pass("tonemap", |rec| rec.dispatch(&self.tonemap, &bindings, &push, [width, height, 1]))
+    }
+}
+
+/// Number of a tone curve in `glsl/film/tonemap.glsl`.
+fn curve(curve: ToneCurve) -> u32 {
+    match curve {
+        ToneCurve::Filmic => constants::CURVE_FILMIC,
+        ToneCurve::Linear => constants::CURVE_LINEAR,
     }
 }

@@ -7,6 +7,11 @@ pub(crate) mod layout {
     include!(concat!(env!("OUT_DIR"), "/layout.rs"));
 }
 
+/// The numbers that shaders have names for, a module for each file: `glsl/medium/phase.glsl` is `medium_phase_glsl`.
+pub(crate) mod constants {
+    include!(concat!(env!("OUT_DIR"), "/constants.rs"));
+}
+
 /// Checks a `#[repr(C)]` struct against its shader twin: `assert_layout!(Particle, particle, { centre: CENTRE, … })`.
 macro_rules! assert_layout {
     ($rust:ty, $glsl:ident, { $($field:ident: $offset:ident),* $(,)? }) => {

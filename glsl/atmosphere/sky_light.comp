@@ -10,7 +10,9 @@ const int STEPS = 24;
 // 1/(1 + 3/4 τ(1 − g)) of a layer with τ = 30, g = 0.85.
 const float CLOUD_GLOW = 0.23;
 layout(local_size_x = DIRECTIONS) in;
-layout(constant_id = 0) const uint SKY_MODEL = 1; // 0: no sky, the sun shines undimmed; 1: this atmosphere
+const uint SKY_NONE = 0u;         // the sun shines undimmed
+const uint SKY_ATMOSPHERE = 1u;
+layout(constant_id = 0) const uint SKY_MODEL = SKY_ATMOSPHERE;
 layout(binding = 0, std430) restrict readonly buffer Air { AirParams params; } air;
 layout(binding = 1, std430) restrict readonly buffer Frame { FrameParams params; } frame;
 layout(binding = 2) uniform sampler2D transmittance_lut;
@@ -62,7 +64,7 @@ float mean_cloud_transmittance() {
 void main() {
     SkyLight light;
     light.reserved_a = light.reserved_b = light.reserved_c = light.reserved_d = light.reserved_e = 0.0;
-    if (SKY_MODEL == 0u) {
+    if (SKY_MODEL == SKY_NONE) {
         light.sun_irradiance_clouds = light.sun_irradiance_ground = air.params.solar_irradiance;
         light.sky_irradiance_clouds = light.ground_irradiance_clouds = light.sky_irradiance_ground = vec3(0.0);
     } else {

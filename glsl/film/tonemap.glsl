@@ -2,6 +2,10 @@
 #ifndef FILM_TONEMAP
 #define FILM_TONEMAP
 
+// Values of `curve`.
+const uint CURVE_FILMIC = 0u;
+const uint CURVE_LINEAR = 1u;   // values above 1 clip
+
 // Toe and shoulder per channel, so that bright clouds roll off to neutral white and the toe deepens the zenith: a rational
 // fit of the ACES reference curve (Narkowicz 2015). Of the curves tried (also Hable, AgX, Uchimura) it is the one that
 // shows sunlit tops nearly white and the zenith deep blue at the same exposure.
@@ -21,7 +25,7 @@ float srgb_decode(float x) {
 
 vec3 display_value(vec3 radiance, vec3 gain, uint curve) {
     vec3 x = max(radiance * gain, 0.0);
-    vec3 toned = curve == 0u ? vec3(filmic(x.r), filmic(x.g), filmic(x.b)) : min(x, 1.0);
+    vec3 toned = curve == CURVE_FILMIC ? vec3(filmic(x.r), filmic(x.g), filmic(x.b)) : min(x, 1.0);
     return vec3(srgb_encode(toned.r), srgb_encode(toned.g), srgb_encode(toned.b));
 }
 

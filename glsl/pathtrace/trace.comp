@@ -17,7 +17,10 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint HOMOGENEOUS = 0u;  // 1: density 1 all over each ellipsoid
 layout(constant_id = 1) const uint EMISSION = 0u;     // 1: particles shine with their colour and do not scatter
-layout(constant_id = 2) const uint SKY = 0u;          // light from all around: 0 none, 1 uniform, 2 the atmosphere's
+const uint SKY_NONE = 0u;
+const uint SKY_UNIFORM = 1u;
+const uint SKY_ATMOSPHERE = 2u;
+layout(constant_id = 2) const uint SKY = SKY_NONE;    // light from all around
 layout(constant_id = 3) const uint ANALOGUE = 0u;     // 1: the estimator for tests: absorbed paths end, no rays to the sun
 layout(constant_id = 4) const uint PHASE_FUNCTION = PHASE_CORNETTE_SHANKS;
 layout(constant_id = 5) const uint ANTIALIAS = 0u;    // 1: rays are spread over the pixel; 0: through its centre
@@ -111,8 +114,8 @@ void set_out(uint kind, vec3 origin, vec3 dir, float u) {
 }
 
 vec3 sky_from(vec3 dir) {
-    if (SKY == 0u) return vec3(0.0);
-    if (SKY == 1u) return medium.uniform_sky;
+    if (SKY == SKY_NONE) return vec3(0.0);
+    if (SKY == SKY_UNIFORM) return medium.uniform_sky;
     float h = medium.sky_altitude;
     if (hits_ground(clear_air, h, dir.y)) return lights.ground_irradiance_clouds / AIR_PI;
     return sky_radiance(sky_smooth, sky_aerosol, clear_air, h, dir, view.to_sun);
@@ -328,7 +331,7 @@ void main() {
     cell_grid = grid.params;
     medium = params.path;
     lights = sky_light.params;
-    if (SKY == 2u) clear_air = air.params;
+    if (SKY == SKY_ATMOSPHERE) clear_air = air.params;
     uint index = gl_GlobalInvocationID.x;
     if (index >= push.pixel_count) return;
     s = states.state[index];

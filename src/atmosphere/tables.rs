@@ -8,6 +8,7 @@ use crate::shaders::{
     atmosphere_aerial_comp as aerial, atmosphere_multiple_comp as multiple, atmosphere_sky_light_comp as sky_light,
     atmosphere_sky_view_comp as sky_view, atmosphere_transmittance_comp as transmittance,
 };
+use crate::shared::constants::atmosphere_sky_light_comp as constants;
 use crate::shared::{FrameParams, assert_layout};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -77,7 +78,11 @@ impl Atmosphere {
     pub fn new(gpu: &Arc<Gpu>, model: SkyModel, air: &Air) -> Result<Self> {
         air.validate()?;
         let flat = |size: [u32; 2]| [size[0], size[1], 0];
-        let model_constant = [("SKY_MODEL", u32::from(model == SkyModel::Atmosphere))];
+        let number = match model {
+            SkyModel::None => constants::SKY_NONE,
+            SkyModel::Atmosphere => constants::SKY_ATMOSPHERE,
+        };
+        let model_constant = [("SKY_MODEL", number)];
         Ok(Self {
             model,
             filled: Once::new(),

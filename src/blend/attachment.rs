@@ -75,7 +75,8 @@ impl AttachmentMode {
         let program = match k {
             1 => one::program(lighting),
             2 => two::program(lighting),
-            _ => four::program(lighting),
+            4 => four::program(lighting),
+            other => panic!("no attachments keep a window of {other} segments"),
         };
         Ok(Self {
             pipeline: GraphicsPipeline::new(gpu, program, &shading.specialization(), state)?,

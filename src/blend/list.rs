@@ -29,7 +29,7 @@ assert_layout!(SegmentNode, segment_node, {
 });
 
 /// `next` of the last node.
-const NO_NODE: u32 = u32::MAX;
+const NO_NODE: u32 = crate::shared::constants::blend_list_glsl::NO_NODE;
 
 /// Nodes to begin with, per pixel.
 const NODES_PER_PIXEL: u32 = 8;

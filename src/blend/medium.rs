@@ -2,6 +2,7 @@
 
 use crate::params::{Clouds, Phase};
 use crate::shared::assert_layout;
+use crate::shared::constants::medium_phase_glsl as constants;
 use bytemuck::{Pod, Zeroable};
 
 /// Parameters of the shading model (Yusov 4.4).
@@ -10,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 pub struct MediumParams {
     /// Asymmetry of the scattering event that meets the sun.
     pub g_single: f32,
-    /// 0: Cornette-Shanks, 1: Henyey-Greenstein.
+    /// `PHASE_*` of `glsl/medium/phase.glsl`.
     pub phase_function: u32,
     /// Single-scattering albedo.
     pub albedo: f32,
@@ -37,7 +38,7 @@ impl MediumParams {
     pub fn new(clouds: &Clouds) -> Self {
         Self {
             g_single: clouds.g_single,
-            phase_function: u32::from(clouds.phase == Phase::HenyeyGreenstein),
+            phase_function: phase_function(clouds.phase),
             albedo: clouds.albedo,
             crease: 0.5,
             detail: 1.0,
@@ -45,5 +46,13 @@ impl MediumParams {
             reserved_a: 0.0,
             reserved_b: 0.0,
         }
+    }
+}
+
+/// Number of a phase function in `glsl/medium/phase.glsl`.
+pub(crate) fn phase_function(phase: Phase) -> u32 {
+    match phase {
+        Phase::CornetteShanks => constants::PHASE_CORNETTE_SHANKS,
+        Phase::HenyeyGreenstein => constants::PHASE_HENYEY_GREENSTEIN,
     }
 }

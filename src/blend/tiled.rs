@@ -20,7 +20,7 @@ use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
 /// Pixels along a side of a tile.
-const TILE: u32 = 8;
+const TILE: u32 = crate::shared::constants::blend_tile_particle_glsl::TILE;
 
 /// Significant bits of the key that particles are sorted by.
 const DISTANCE_BITS: u32 = 16;

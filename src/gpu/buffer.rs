@@ -50,7 +50,7 @@ impl Buffer {
         );
         // SAFETY: the device is alive as long as `gpu`, and the description is complete.
         let handle = unsafe { gpu.device().create_buffer(&info, None) }
-            .map_err(|result| gpu.error("vkCreateBuffer", name, result))?;
+            .map_err(|result| gpu.sized_error("vkCreateBuffer", name, Some(size), result))?;
         let mut buffer =
             Self { gpu: gpu.clone(), id: next_id(), name: name.to_owned(), handle, size, kind, allocation: None };
         // SAFETY: the buffer was created above on this device.
@@ -64,7 +64,7 @@ impl Buffer {
         // SAFETY: the memory satisfies the requirements of this buffer, which is not bound yet.
         let bound = unsafe { gpu.device().bind_buffer_memory(handle, allocation.memory, allocation.offset) };
         buffer.allocation = Some(allocation);
-        bound.map_err(|result| gpu.error("vkBindBufferMemory", name, result))?;
+        bound.map_err(|result| gpu.sized_error("vkBindBufferMemory", name, Some(size), result))?;
         gpu.set_name(handle, name);
         Ok(buffer)
     }

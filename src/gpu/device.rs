@@ -194,9 +194,14 @@ impl Gpu {
 
     /// The error for `result` of Vulkan function `call`, made for `what`.
     pub(crate) fn error(&self, call: &'static str, what: &str, result: vk::Result) -> Error {
+        self.sized_error(call, what, None, result)
+    }
+
+    /// The same for a call that asks for so many `bytes`.
+    pub(crate) fn sized_error(&self, call: &'static str, what: &str, bytes: Option<u64>, result: vk::Result) -> Error {
         match result {
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-                Error::OutOfMemory { what: format!("{what} ({call})"), bytes: 0 }
+                Error::OutOfMemory { what: format!("{what} ({call})"), bytes }
             }
             vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { last_pass: what.to_owned() },
             result => Error::Vulkan { call, pass: what.to_owned(), result },

@@ -92,7 +92,7 @@ impl Image {
         // SAFETY: the memory satisfies the requirements of this image, which is not bound yet.
         let bound = unsafe { gpu.device().bind_image_memory(handle, allocation.memory, allocation.offset) };
         image.allocation = Some(allocation);
-        bound.map_err(|result| gpu.error("vkBindImageMemory", desc.name, result))?;
+        bound.map_err(|result| gpu.sized_error("vkBindImageMemory", desc.name, Some(requirements.size), result))?;
         let info = vk::ImageViewCreateInfo::default()
             .image(handle)
             .view_type(view_type)

@@ -117,7 +117,7 @@ impl DefaultAllocator {
         };
         gpu_allocator::vulkan::Allocator::new(&desc)
             .map(|allocator| Self(Mutex::new(allocator)))
-            .map_err(|error| Error::OutOfMemory { what: format!("the allocator ({error})"), bytes: 0 })
+            .map_err(|error| Error::OutOfMemory { what: format!("the allocator ({error})"), bytes: None })
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, gpu_allocator::vulkan::Allocator> {
@@ -145,10 +145,10 @@ impl Allocator for DefaultAllocator {
             linear,
             allocation_scheme: gpu_allocator::vulkan::AllocationScheme::GpuAllocatorManaged,
         };
-        let allocation = self
-            .lock()
-            .allocate(&desc)
-            .map_err(|error| Error::OutOfMemory { what: format!("{name} ({error})"), bytes: requirements.size })?;
+        let allocation = self.lock().allocate(&desc).map_err(|error| Error::OutOfMemory {
+            what: format!("{name} ({error})"),
+            bytes: Some(requirements.size),
+        })?;
         // SAFETY: the memory is freed only through `free`, which takes the piece back by value.
         let memory = unsafe { allocation.memory() };
         Ok(Allocation {

@@ -8,7 +8,7 @@ use crate::reference::density::FieldFrequencies;
 use crate::shared::assert_layout;
 
 /// Rings that the device's struct holds.
-pub const RING_CAPACITY: usize = 8;
+pub const RING_CAPACITY: usize = crate::shared::constants::grid_params_glsl::RING_CAPACITY as usize;
 /// Layers of one column at most: the layer index of a particle has five bits.
 pub const LAYER_CAPACITY: u32 = 24;
 /// Thickness that a preset's layers fill [m] (the authors' scene); a thicker layer of cloud takes more of them.

@@ -9,6 +9,7 @@ use crate::definitions::REFERENCE_SEED;
 use crate::gpu::{ComputePipeline, Gpu, Image, ImageDesc, Recorder, Sampled, Sampler};
 use crate::params::Style;
 use crate::shaders::{lut_optical_depth_comp as optical_depth, lut_profile_comp as profile};
+use crate::shared::constants::lut_profile_glsl as constants;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -30,10 +31,10 @@ struct MarchPush {
 /// Number of a style in `profile.glsl`.
 pub fn style_index(style: Style) -> u32 {
     match style {
-        Style::Homogeneous => 0,
-        Style::Radial => 1,
-        Style::Threshold => 2,
-        Style::Pyroclastic => 3,
+        Style::Homogeneous => constants::PROFILE_HOMOGENEOUS,
+        Style::Radial => constants::PROFILE_RADIAL,
+        Style::Threshold => constants::PROFILE_THRESHOLD,
+        Style::Pyroclastic => constants::PROFILE_PYROCLASTIC,
     }
 }
 

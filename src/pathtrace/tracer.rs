@@ -8,13 +8,15 @@ use bytemuck::{Pod, Zeroable};
 use super::cells::{CellCounts, CellGrid};
 use super::state::{PixelSums, State};
 use crate::atmosphere::{Air, Atmosphere};
+use crate::blend::medium::{MediumParams, phase_function};
 use crate::definitions::REFERENCE_SEED;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Frames, Image, ImageDesc, Sampler};
 use crate::lut::style_index;
 use crate::lut::tables::central_fill;
-use crate::params::{Blend, Film, Lighting, Params, Phase, Precision, SkyModel, Style};
+use crate::params::{Blend, Film, Lighting, Params, Precision, SkyModel, Style};
 use crate::renderer::Renderer;
 use crate::shaders::{lut_profile_comp as profile, pathtrace_trace_comp as trace};
+use crate::shared::constants::pathtrace_trace_comp as constants;
 use crate::shared::{FrameParams, assert_layout};
 use crate::{Error, Result};
 
@@ -210,8 +212,11 @@ impl PathTracer {
         let sky = make_sky(frames, &params, &renderer, &frame)?;
         let clouds = &params.clouds;
         let (sky_kind, uniform_sky) = match options.environment {
-            Environment::Uniform(radiance) => (1, radiance),
-            Environment::Scene => (2 * u32::from(params.sky.model == SkyModel::Atmosphere), [0.0; 3]),
+            Environment::Uniform(radiance) => (constants::SKY_UNIFORM, radiance),
+            Environment::Scene => match params.sky.model {
+                SkyModel::None => (constants::SKY_NONE, [0.0; 3]),
+                SkyModel::Atmosphere => (constants::SKY_ATMOSPHERE, [0.0; 3]),
+            },
         };
         let sine = (0.5 * f64::from(params.sun.angular_radius)).to_radians().sin();
         let path = PathParams {
@@ -221,7 +226,7 @@ impl PathTracer {
             g_single: clouds.g_single,
             g_multiple: clouds.g_multiple,
             albedo: clouds.albedo,
-            detail: crate::blend::medium::MediumParams::new(clouds).detail,
+            detail: MediumParams::new(clouds).detail,
             seed: options.seed,
             reserved: [0; 2],
         };
@@ -233,7 +238,7 @@ impl PathTracer {
                 ("EMISSION", u32::from(emission)),
                 ("SKY", sky_kind),
                 ("ANALOGUE", u32::from(options.estimator == Estimator::Analogue)),
-                ("PHASE_FUNCTION", u32::from(clouds.phase == Phase::HenyeyGreenstein)),
+                ("PHASE_FUNCTION", phase_function(clouds.phase)),
                 ("ANTIALIAS", u32::from(options.antialias)),
             ],
         )?;

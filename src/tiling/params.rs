@@ -5,9 +5,9 @@ use bytemuck::{Pod, Zeroable};
 use crate::shared::assert_layout;
 
 /// Levels that the device's struct holds.
-pub const LEVEL_CAPACITY: usize = 8;
+pub const LEVEL_CAPACITY: usize = crate::shared::constants::tiling_params_glsl::TILE_LEVELS as usize;
 /// Ends a list; also "no tile".
-pub const NO_NODE: u32 = u32::MAX;
+pub const NO_NODE: u32 = crate::shared::constants::tiling_params_glsl::NO_NODE;
 /// Tiles along the edge of a level (Yusov 5.3).
 pub const TILE_DIM: u32 = 64;
 /// Nodes that one receiver visits at most: far beyond any sensible list, so that a degenerate scene ends too.

@@ -17,6 +17,7 @@ use crate::grid::{Grid, GridParams, ParticleSet};
 use crate::params::{Clouds, Transfer};
 use crate::shaders::{lighting_tables_smooth_comp as smooth, lighting_tables_sun_comp as sun};
 use crate::shared::ParticleLight;
+use crate::shared::constants::lighting_tables_transfer_glsl as constants;
 use crate::tiling::Tiling;
 
 #[repr(C)]
@@ -117,7 +118,7 @@ impl Occlusion {
                 sun: &self.sun_light,
                 sun_depths: &self.sun_depths,
             },
-            &SunPush { xi: clouds.xi, transfer: u32::from(clouds.transfer == Transfer::Exponential), voxel },
+            &SunPush { xi: clouds.xi, transfer: transfer(clouds.transfer), voxel },
             set.args(),
             ParticleSet::PARTICLE_ARGS,
         )?;
@@ -138,5 +139,13 @@ impl Occlusion {
             set.args(),
             ParticleSet::PARTICLE_ARGS,
         )
+    }
+}
+
+/// Number of a transfer in `glsl/lighting/tables/transfer.glsl`.
+fn transfer(transfer: Transfer) -> u32 {
+    match transfer {
+        Transfer::Diffusion => constants::TRANSFER_DIFFUSION,
+        Transfer::Exponential => constants::TRANSFER_EXPONENTIAL,
     }
 }

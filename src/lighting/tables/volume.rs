@@ -26,7 +26,8 @@ use crate::shaders::{
 use crate::shared::assert_layout;
 
 /// Levels that the device's struct holds.
-pub const LEVEL_CAPACITY: usize = 8;
+pub const LEVEL_CAPACITY: usize =
+    crate::shared::constants::lighting_tables_diffusion_params_glsl::VOLUME_LEVELS as usize;
 /// What fills empty space, as an extinction of isotropic scattering [1/m]: clouds closer than its inverse light each other.
 pub const VACUUM: f32 = 1.0 / 240.0;
 
