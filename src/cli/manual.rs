@@ -64,7 +64,7 @@ mod tests {
                 // roff writes a hyphen as \-.
                 assert!(page.contains(&format!("\\-\\-{}", flag.replace('-', "\\-"))), "{name} --{flag}:\n{page}");
             }
-            assert!(overview.contains(&format!("welkin\\-{name}")), "{name}");
+            assert!(overview.contains(&format!("welkin\\-{}", name.replace('-', "\\-"))), "{name}");
             pages += 1;
         }
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), pages);
