@@ -175,6 +175,18 @@
 //! - **Every particle is lit**, seen or not: light must not change when the camera turns.
 //!   (`tests/oracle_lighting.rs::smoothing_and_skylight_are_those_of_the_reference`)
 //!
+//! Forward scattering (Harris 2.2–2.3, Stoian 3–4; `docs/lighting.md`):
+//! - **What goes on forward is albedo × (1 − e^−τ) × the phase function over the cone γ**, the papers' albedo × τ × p γ / 4π for
+//!   thin particles and narrow cones, which for thick ones makes light.
+//!   (`src/reference/forward.rs::energy_never_grows_for_any_cone_and_all_of_it_goes_on_at_albedo_1_in_the_whole_sphere`)
+//! - **Each place scatters on the light that it holds itself**, not what the middle of the particle reads: order matters within
+//!   a place alone, and particles need not wait for one another.
+//!   (`src/reference/forward.rs::a_fine_buffer_blended_as_published_differs_by_where_scattered_light_is_taken`)
+//! - **No buffer**: particles walk the light tiles' lists, which end in the same order with and without interlock; a buffer's
+//!   texels can be had. (`tests/oracle_forward.rs::light_on_every_particle_of_a_list_is_the_references_and_the_same_from_interlock_and_sorting`)
+//! - **The square that a particle reads is four points of it, and no wider than half of the particle.**
+//!   (`tests/oracle_forward.rs::light_on_every_particle_of_a_grid_is_the_references`)
+//!
 //! Shading (Yusov 4.4, 5.4):
 //! - **Detail noise displaces the surface**, along silhouettes too, in octaves anchored to the world; the paper does not say how
 //!   it adds it. (`tests/oracle_detail.rs::every_texel_of_the_tile_is_the_noise_at_its_centre`,

@@ -16,10 +16,7 @@ use crate::lists::ListUse;
 use crate::params::{Animation, Camera, Params, SkyModel, Style, Sun, SunPosition};
 use crate::shared::FrameParams;
 use crate::source::{self, ParticleSource, Place};
-use crate::tiling::{Tiling, TilingParams};
-
-/// Light list nodes to begin with, per particle that fits.
-const NODES_PER_PARTICLE: u32 = 7;
+use crate::tiling::{NODES_PER_PARTICLE, Tiling, TilingParams};
 
 /// The clouds and the air of a frame. [`View`](crate::view::View)s look at it.
 pub struct Sky {
@@ -58,12 +55,13 @@ impl Sky {
         let source = source::open(gpu, params, slots)?;
         let set = ParticleSet::new(gpu, source.capacity())?;
         let nodes = set.capacity().saturating_mul(NODES_PER_PARTICLE);
-        let setting = lighting::Setting { gpu, params, spread: source.spread(), capacity: set.capacity(), slots };
+        let (spread, levels) = (source.spread(), source.levels());
+        let setting = lighting::Setting { gpu, params, spread, capacity: set.capacity(), levels, slots };
         let frame = (0..slots)
             .map(|_| Buffer::new(gpu, "sky frame params", size_of::<FrameParams>() as u64, BufferKind::Upload))
             .collect::<Result<_>>()?;
         Ok(Self {
-            tiling: Tiling::new(gpu, source.levels(), set.capacity(), nodes, slots)?,
+            tiling: Tiling::new(gpu, levels, set.capacity(), nodes, slots)?,
             light: lighting::open(&setting)?,
             detail: DetailTile::new(gpu)?,
             medium: Buffer::upload(gpu, "medium", &[MediumParams::new(&params.clouds)])?,

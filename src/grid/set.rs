@@ -44,6 +44,8 @@ impl Counters {
     pub const STORED: u32 = 3;
     /// Word of [`Counters::visible`] in the buffer.
     pub const VISIBLE: u32 = 4;
+    /// Word of [`Counters::tile_nodes`] in the buffer.
+    pub const TILE_NODES: u32 = 5;
 }
 
 /// Particles, their cells, their counts and the arguments of dispatches over them.

@@ -8,6 +8,7 @@
 //! Shaders of any method get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
 
 mod flat;
+pub mod forward;
 pub mod tables;
 
 use std::sync::Arc;
@@ -29,6 +30,8 @@ pub(crate) struct Setting<'a> {
     pub spread: Spread,
     /// Particles that the set holds.
     pub capacity: u32,
+    /// Levels of light tiles.
+    pub levels: u32,
     /// Frames in flight.
     pub slots: usize,
 }
@@ -102,8 +105,8 @@ pub(crate) fn open(setting: &Setting<'_>) -> Result<Box<dyn Method>> {
     match setting.params.clouds.lighting {
         Lighting::Tables => Ok(Box::new(tables::TableLight::new(setting)?)),
         Lighting::Flat => Ok(Box::new(flat::Flat)),
-        later @ (Lighting::Forward
-        | Lighting::Attenuation
+        Lighting::Forward => Ok(Box::new(forward::ForwardLight::new(setting)?)),
+        later @ (Lighting::Attenuation
         | Lighting::March
         | Lighting::MarchCached
         | Lighting::MarchMulti

@@ -3,7 +3,7 @@
 //! Scene files, `welkin devices`, `docs/scene.md` and the errors for what is not here or does not go together are made from
 //! these tables.
 
-use super::{Blend, Lighting, Params, Phase, Source, Style, Transfer};
+use super::{Blend, ForwardPhase, LightFrom, Lighting, Params, Phase, Source, Splat, Style, Transfer};
 use crate::{Error, Result};
 
 /// One name of an axis.
@@ -107,7 +107,11 @@ pub const LIGHTINGS: &[LightingMethod] = &[
         reads_tables: false,
     },
     LightingMethod {
-        axis: later("forward", Lighting::Forward, "multiple forward scattering"),
+        axis: here(
+            "forward",
+            Lighting::Forward,
+            "multiple forward scattering along each light, and single scattering to the eye",
+        ),
         sources: PARTICLES,
         reads_tables: false,
     },
@@ -164,6 +168,25 @@ pub const TRANSFERS: &[AxisValue<Transfer>] = &[
 pub const PHASES: &[AxisValue<Phase>] = &[
     here("cornette-shanks", Phase::CornetteShanks, "Cornette and Shanks"),
     here("henyey-greenstein", Phase::HenyeyGreenstein, "Henyey and Greenstein"),
+];
+
+/// `clouds.splat`.
+pub const SPLATS: &[AxisValue<Splat>] = &[
+    here("gaussian", Splat::Gaussian, "a Gaussian (Harris)"),
+    here("polynomial", Splat::Polynomial, "2 f³ − 3 f² + 1 (Stoian)"),
+];
+
+/// `clouds.forward_phase`.
+pub const FORWARD_PHASES: &[AxisValue<ForwardPhase>] = &[
+    here("rayleigh", ForwardPhase::Rayleigh, "Rayleigh's"),
+    here("scene", ForwardPhase::Scene, "the scene's, with g_single"),
+];
+
+/// `from` of `[[clouds.light]]`.
+pub const LIGHT_FROMS: &[AxisValue<LightFrom>] = &[
+    here("own", LightFrom::Own, "colour is its irradiance"),
+    here("sun", LightFrom::Sun, "the sun's irradiance"),
+    here("sky", LightFrom::Sky, "the sky's irradiance"),
 ];
 
 impl Lighting {

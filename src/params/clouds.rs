@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::check;
+use super::{Forward, check};
 use crate::{Error, Result};
 
 /// The cloud layer or list of cloud particles.
@@ -44,6 +44,8 @@ pub struct Clouds {
     pub smoothing: f32,
     /// No particle is made farther from the camera than this [m]. Default 1e5 (the authors' scene).
     pub particle_cutoff: f32,
+    /// How [`Lighting::Forward`] lights them.
+    pub forward: Forward,
 }
 
 /// Where particles come from.
@@ -205,6 +207,7 @@ impl Default for Clouds {
             xi: Transfer::Diffusion.xi(),
             smoothing: 0.0,
             particle_cutoff: 1.0e5,
+            forward: Forward::default(),
         }
     }
 }
@@ -239,6 +242,7 @@ impl Clouds {
         check::within("clouds.orders", self.orders, 0..=1000, "(0: until converged)")?;
         check::within("clouds.xi", self.xi, 0.0..=1.0, "")?;
         check::within("clouds.smoothing", self.smoothing, 0.0..=10.0, "")?;
+        self.forward.validate()?;
         check::within("clouds.particle_cutoff", self.particle_cutoff, 1.0e3..=1.0e6, "m")
     }
 }

@@ -12,6 +12,7 @@ mod axes;
 mod camera;
 pub(crate) mod check;
 mod clouds;
+mod forward;
 mod quality;
 mod sky;
 pub mod solar;
@@ -19,11 +20,12 @@ mod sun;
 
 pub use animation::{Animation, CameraKey, CloudMotion, WIND_LAYERS};
 pub use axes::{
-    AxisValue, BLENDS, LIGHTINGS, LightingMethod, PHASES, Row, SOURCES, STYLES, SourceKind, TRANSFERS, lightings_of,
-    lookup,
+    AxisValue, BLENDS, FORWARD_PHASES, LIGHT_FROMS, LIGHTINGS, LightingMethod, PHASES, Row, SOURCES, SPLATS, STYLES,
+    SourceKind, TRANSFERS, lightings_of, lookup,
 };
 pub use camera::{Aim, Basis, Camera};
 pub use clouds::{Clouds, Coverage, CoverageMap, Lighting, ParticleDesc, Phase, Source, Style, Transfer};
+pub use forward::{Forward, ForwardPhase, LIGHT_CAPACITY, Light, LightFrom, Splat};
 pub use quality::{Blend, Precision, Preset, Quality, WINDOWS};
 pub use sky::{Film, Ground, Sky, SkyModel, ToneCurve};
 pub use sun::{Sun, SunPosition};
@@ -177,9 +179,23 @@ mod tests {
     }
 
     #[test]
+    fn a_bad_light_is_named_by_its_number() {
+        let with = |light: Light| blamed(|p| p.clouds.forward.lights = vec![Light::SUN, light]);
+        assert_eq!(with(Light::SKY), "nothing");
+        for direction in [[0.0; 3], [0.0, 1.1, 0.0], [f64::NAN, 1.0, 0.0]] {
+            assert_eq!(with(Light { direction: Some(direction), ..Light::SKY }), "clouds.light[1].direction");
+        }
+        assert_eq!(with(Light { colour: [1.0, -0.1, 1.0], ..Light::SUN }), "clouds.light[1].colour[1]");
+        assert_eq!(blamed(|p| p.clouds.forward.lights = vec![Light::SUN; LIGHT_CAPACITY + 1]), "clouds.light");
+        assert_eq!(blamed(|p| p.clouds.forward.lights.clear()), "clouds.light");
+        assert_eq!(blamed(|p| p.clouds.forward.solid_angle = 0.0), "clouds.forward_solid_angle");
+        assert_eq!(blamed(|p| p.clouds.forward.resolution = 5000), "clouds.forward_resolution");
+    }
+
+    #[test]
     fn names_that_are_known_but_not_here_yet_say_so() {
-        let forward = blamed(|p| p.clouds.lighting = Lighting::Forward);
-        assert_eq!(forward, "unsupported clouds.lighting = \"forward\"");
+        let march = blamed(|p| p.clouds.lighting = Lighting::March);
+        assert_eq!(march, "unsupported clouds.lighting = \"march\"");
         assert!(
             blamed(|p| p.clouds.lighting = Lighting::Flat).starts_with("unsupported clouds.lighting = \"flat\" with")
         );

@@ -7,6 +7,7 @@ pub mod density;
 pub mod detail;
 pub mod extinction;
 pub mod film;
+pub mod forward;
 pub mod grid;
 pub mod lighting;
 pub mod monte_carlo;

@@ -7,9 +7,11 @@ use toml::value::{Datetime, Offset};
 
 use super::particles::ParticleKeys;
 use super::{coverage, particles};
+use crate::params::check;
 use crate::params::{
-    Aim, Animation, Camera, CameraKey, Clouds, Coverage, Film, Ground, LIGHTINGS, PHASES, Params, Precision, Preset,
-    Quality, SOURCES, STYLES, Sky, SkyModel, Source, SourceKind, Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
+    Aim, Animation, Camera, CameraKey, Clouds, Coverage, FORWARD_PHASES, Film, Forward, Ground, LIGHT_FROMS, LIGHTINGS, Light,
+    LightFrom, PHASES, Params, Precision, Preset, Quality, SOURCES, SPLATS, STYLES, Sky, SkyModel, Source, SourceKind,
+    Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
 };
 use crate::{Error, Result};
 
@@ -72,10 +74,26 @@ struct CloudKeys {
     xi: Option<f32>,
     smoothing: Option<f32>,
     particle_cutoff: Option<f32>,
+    light: Option<Vec<LightKeys>>,
+    splat: Option<String>,
+    forward_solid_angle: Option<f32>,
+    forward_resolution: Option<u32>,
+    forward_phase: Option<String>,
     file: Option<PathBuf>,
     particle: Option<Vec<ParticleKeys>>,
     grid: Option<String>,
     density_scale: Option<f32>,
+}
+
+/// One `[[clouds.light]]`.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct LightKeys {
+    from: Option<String>,
+    direction: Option<[f64; 3]>,
+    elevation: Option<f64>,
+    azimuth: Option<f64>,
+    colour: Option<[f32; 3]>,
 }
 
 #[derive(Deserialize, Default)]
@@ -264,9 +282,25 @@ impl CloudKeys {
         clouds.xi = self.xi.unwrap_or(clouds.transfer.xi());
         set(&mut clouds.smoothing, self.smoothing);
         set(&mut clouds.particle_cutoff, self.particle_cutoff);
+        clouds.forward = self.forward()?;
         clouds.coverage = self.coverage(base, note)?;
         clouds.source = self.source(base)?;
         Ok(clouds)
+    }
+
+    fn forward(&self) -> Result<Forward> {
+        let mut forward = Forward::default();
+        set_named(&mut forward.splat, self.splat.as_ref(), |name| lookup(SPLATS, "clouds.splat", name))?;
+        set_named(&mut forward.phase, self.forward_phase.as_ref(), |name| {
+            lookup(FORWARD_PHASES, "clouds.forward_phase", name)
+        })?;
+        set(&mut forward.solid_angle, self.forward_solid_angle);
+        set(&mut forward.resolution, self.forward_resolution);
+        if let Some(lights) = &self.light {
+            let lights = lights.iter().enumerate().map(|(index, light)| light.into_light(index));
+            forward.lights = lights.collect::<Result<_>>()?;
+        }
+        Ok(forward)
     }
 
     fn coverage(&self, base: &Path, note: &mut dyn FnMut(&str)) -> Result<Coverage> {
@@ -329,6 +363,40 @@ impl CloudKeys {
             }),
             (SourceKind::Voxels, None, _) => Err(Error::invalid("clouds.source", "voxels", "clouds.file beside it")),
         }
+    }
+}
+
+impl LightKeys {
+    fn into_light(&self, index: usize) -> Result<Light> {
+        let field = |key: &str| format!("clouds.light[{index}].{key}");
+        let mut from = LightFrom::Own;
+        set_named(&mut from, self.from.as_ref(), |name| lookup(LIGHT_FROMS, &field("from"), name))?;
+        let mut light = match from {
+            LightFrom::Sun => Light::SUN,
+            LightFrom::Sky => Light::SKY,
+            LightFrom::Own => Light { from, ..Light::SUN },
+        };
+        set(&mut light.colour, self.colour);
+        match (self.direction, self.elevation.or(self.azimuth)) {
+            (Some(direction), None) => light.direction = Some(direction),
+            (Some(direction), Some(_)) => {
+                let expected = "either direction or elevation and azimuth";
+                return Err(Error::invalid(field("direction"), format!("{direction:?}"), expected));
+            }
+            (None, Some(_)) => {
+                let (elevation, azimuth) = (self.elevation.unwrap_or(0.0), self.azimuth.unwrap_or(0.0));
+                for (key, value, most) in [("elevation", elevation, 90.0), ("azimuth", azimuth, 360.0)] {
+                    check::within(&field(key), value, -most..=most, "degrees")?;
+                }
+                let position = SunPosition::Angles { elevation, azimuth };
+                light.direction = Some(Sun { position, ..Sun::default() }.to_sun());
+            }
+            (None, None) if from == LightFrom::Own => {
+                return Err(Error::invalid(field("from"), "own", "direction or elevation and azimuth beside it"));
+            }
+            (None, None) => {}
+        }
+        Ok(light)
     }
 }
 

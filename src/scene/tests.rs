@@ -1,5 +1,5 @@
 use super::*;
-use crate::params::{Aim, Blend, Coverage, Lighting, Quality, Source, Style, SunPosition};
+use crate::params::{Aim, Blend, Coverage, Light, Lighting, Quality, Source, Splat, Style, SunPosition};
 
 fn read(text: &str, overrides: &[&str]) -> Result<Params> {
     let overrides: Vec<_> =
@@ -149,8 +149,39 @@ fn faults_of_overrides_name_the_flag() {
 fn choices_of_later_versions_are_unsupported() {
     let error = read("[clouds]\nlighting = \"march\"", &[]).unwrap_err();
     assert!(matches!(error, Error::Unsupported { .. }));
-    let expected = "clouds.lighting = \"march\" is not supported by this version yet (it has tables, flat)";
+    let expected = "clouds.lighting = \"march\" is not supported by this version yet (it has tables, flat, forward)";
     assert_eq!(error.to_string(), expected);
+}
+
+#[test]
+fn lights_are_read_and_bad_ones_are_pointed_at() {
+    let text = "[clouds]\nlighting = \"forward\"\nsplat = \"polynomial\"\n[[clouds.light]]\nfrom = \"sun\"\n\
+                [[clouds.light]]\nelevation = 0\nazimuth = 90\ncolour = [1, 0.5, 0.2]\n";
+    let forward = read(text, &[]).unwrap().clouds.forward;
+    assert_eq!((forward.lights.len(), forward.lights[0], forward.splat), (2, Light::SUN, Splat::Polynomial));
+    let to_light = forward.lights[1].direction.unwrap();
+    assert!((to_light[0] - 1.0).abs() < 1e-12 && forward.lights[1].colour == [1.0, 0.5, 0.2]); // f64 rounding
+    let cases = [
+        ("from = \"moon\"", "sky.toml:3:8: clouds.light[0].from = moon: expected one of own, sun, sky"),
+        ("direction = [0, 0, 0]", "sky.toml:3:13: clouds.light[0].direction = [0.0, 0.0, 0.0]: expected a unit vector"),
+        ("direction = [0, 2, 0]", "sky.toml:3:13: clouds.light[0].direction = [0.0, 2.0, 0.0]: expected a unit vector"),
+        ("from = \"own\"", "sky.toml:3:8: clouds.light[0].from = own: expected direction or elevation and azimuth"),
+        ("elevation = 91", "sky.toml:3:13: clouds.light[0].elevation = 91: expected a number from -90.0 to 90.0"),
+        (
+            "from = \"sun\"\ncolour = [1, -1, 1]",
+            "sky.toml:4:14: clouds.light[0].colour[1] = -1: expected a number from 0.0",
+        ),
+        ("glow = 1", "sky.toml:3:1: clouds.light[0].glow: expected a known key"),
+    ];
+    for (keys, expected) in cases {
+        let message = complaint(&format!("[clouds]\n[[clouds.light]]\n{keys}\n"), &[]);
+        assert!(message.starts_with(expected), "{keys:?} gave {message:?}, not {expected:?}…");
+    }
+    let five = "[[clouds.light]]\nfrom = \"sun\"\n".repeat(5);
+    let message = complaint(&format!("[clouds]\n{five}"), &[]);
+    assert!(message.contains("clouds.light = 5 lights: expected 1 to 4 lights"), "{message}");
+    let message = complaint("[clouds]\nsplat = \"cube\"\n", &[]);
+    assert!(message.contains("clouds.splat = cube: expected one of gaussian, polynomial"), "{message}");
 }
 
 #[test]

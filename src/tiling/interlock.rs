@@ -56,11 +56,11 @@ impl Interlocked {
         buffer: &Buffer,
         params: &TilingParams,
         set: &ParticleSet,
+        counters: &Buffer,
         (tile_heads, tile_nodes): (&Buffer, &Buffer),
         occluders: &Buffer,
     ) -> Result<()> {
         assert!(set.capacity() <= self.capacity, "the particle set has grown: call grow() too");
-        let counters = set.counters();
         let bindings = args::Bindings { params: buffer, counters, tiling_args: &self.args };
         rec.dispatch(&self.args_pipeline, &bindings, &(), [1, 1, 1])?;
         rec.dispatch_indirect(

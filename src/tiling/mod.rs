@@ -26,6 +26,9 @@ use interlock::Interlocked;
 
 pub use params::{Occluder, Slab, TileNode, TilingParams};
 
+/// Nodes to begin with, per particle that fits.
+pub(crate) const NODES_PER_PARTICLE: u32 = 7;
+
 /// How the lists come to be in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ListOrder {
@@ -148,15 +151,27 @@ impl Tiling {
 
     /// Records insertion and ordering of all stored particles.
     pub fn record(&self, rec: &mut Recorder<'_>, params: &TilingParams, set: &ParticleSet) -> Result<()> {
+        self.record_at(rec, rec.slot(), params, set, set.counters())
+    }
+
+    /// The same with the parameters of `slot`, any of those it was made for, and [`Counters`] that count its nodes.
+    pub(crate) fn record_at(
+        &self,
+        rec: &mut Recorder<'_>,
+        slot: usize,
+        params: &TilingParams,
+        set: &ParticleSet,
+        counters: &Buffer,
+    ) -> Result<()> {
         assert!(params.level_count <= self.levels, "the tiling was made for fewer levels");
         assert!(set.capacity() <= self.particles, "the particle set has grown: call grow() too");
         let params = TilingParams { node_capacity: self.node_capacity, ..*params };
-        let buffer = &self.params[rec.slot()];
+        let buffer = &self.params[slot];
         buffer.write(0, &[params]);
         rec.fill_buffer(&self.heads, 0, self.heads.size(), params::NO_NODE);
         match &self.insertion {
             Insertion::Interlock(interlocked) => {
-                interlocked.record(rec, buffer, &params, set, (&self.heads, &self.nodes), &self.occluders)
+                interlocked.record(rec, buffer, &params, set, counters, (&self.heads, &self.nodes), &self.occluders)
             }
             Insertion::Sort { bin, order } => {
                 rec.dispatch_indirect(
@@ -164,7 +179,7 @@ impl Tiling {
                     &bin::Bindings {
                         params: buffer,
                         particles: set.particles(),
-                        counters: set.counters(),
+                        counters,
                         tile_heads: &self.heads,
                         tile_nodes: &self.nodes,
                         occluders: &self.occluders,

@@ -1,0 +1,230 @@
+//! Multiple forward scattering on the device against `welkin::reference::forward`: all pairs of particles, in f64.
+
+#[path = "support/clouds.rs"]
+mod clouds;
+
+use clouds::{Setup, Stages, open, read, silent};
+use glam::{DQuat, EulerRot};
+use welkin::gpu::Feature;
+use welkin::gpu::standalone::Standalone;
+use welkin::grid::{ParticleList, ParticleSet};
+use welkin::lighting::forward::serial::Serial;
+use welkin::lighting::forward::{IncidentPass, forward_share};
+use welkin::params::{Clouds, Coverage, Forward, ForwardPhase, LIGHT_CAPACITY, ParticleDesc, Quality, Splat};
+use welkin::reference::forward::{Pass, as_published, incident};
+use welkin::shared::Particle;
+use welkin::tiling::{ListOrder, Slab, Tiling, TilingParams};
+
+fn to_light(elevation: f64, azimuth: f64) -> [f64; 3] {
+    let (elevation, azimuth) = (elevation.to_radians(), azimuth.to_radians());
+    [elevation.cos() * azimuth.sin(), elevation.sin(), -elevation.cos() * azimuth.cos()]
+}
+
+fn pass_of(clouds: &Clouds) -> Pass {
+    Pass {
+        splat: clouds.forward.splat,
+        forward: forward_share(clouds),
+        solid_angle: clouds.forward.solid_angle.into(),
+        resolution: clouds.forward.resolution,
+    }
+}
+
+/// The greatest relative error of component `light` of all particles, and the least and the greatest light expected.
+fn worst(device: &[[f32; LIGHT_CAPACITY]], light: usize, expected: &[f64]) -> (f64, f64, f64) {
+    assert_eq!(device.len(), expected.len());
+    let (mut worst, mut least, mut greatest) = (0.0f64, 1.0f64, 0.0f64);
+    for (got, &expected) in device.iter().zip(expected) {
+        // Below 1e-12 there is no light, and f32 ends some decades further.
+        worst = worst.max((f64::from(got[light]) - expected).abs() / expected.max(1e-12));
+        (least, greatest) = (least.min(expected), greatest.max(expected));
+    }
+    (worst, least, greatest)
+}
+
+/// A heap of turned ellipsoids, `count` of them.
+fn heap(count: usize) -> Vec<ParticleDesc> {
+    let mut state = 7u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / (1u64 << 24) as f64
+    };
+    (0..count)
+        .map(|_| {
+            let turn = DQuat::from_euler(EulerRot::XYZ, 6.0 * random(), 6.0 * random(), 6.0 * random());
+            ParticleDesc {
+                centre: [900.0 * random() - 450.0, 2000.0 + 700.0 * random(), -900.0 * random()],
+                radii: std::array::from_fn(|_| (40.0 + 90.0 * random()) as f32),
+                rotation: turn.to_array().map(|c| c as f32),
+                density: (0.1 + 0.7 * random()) as f32,
+                ..ParticleDesc::default()
+            }
+        })
+        .collect()
+}
+
+/// A list on the device, and the ways to light it.
+struct Lit {
+    list: ParticleList,
+    set: ParticleSet,
+    pass: IncidentPass,
+}
+
+impl Lit {
+    fn new(device: &Standalone, particles: &[ParticleDesc]) -> Self {
+        let gpu = device.gpu();
+        let list = ParticleList::new(gpu, particles, 2).unwrap();
+        let set = ParticleSet::new(gpu, list.count()).unwrap();
+        let pass = IncidentPass::new(gpu, set.capacity()).unwrap();
+        Self { list, set, pass }
+    }
+
+    fn particles(&self) -> Vec<Particle> {
+        (0..self.list.count() as usize).map(|i| self.list.particle(i, [0.0; 3])).collect()
+    }
+
+    fn tiles(&self, to_light: [f64; 3], extinction: f32) -> TilingParams {
+        let [least, greatest] = self.list.bounds();
+        let middle = [0, 1, 2].map(|axis| 0.5 * (least[axis] + greatest[axis]));
+        let slab = Slab {
+            centre: middle,
+            base: least[1],
+            thickness: greatest[1] - least[1],
+            half_widths: &[(0.5 * (greatest[0] - least[0])).max(0.5 * (greatest[2] - least[2]))],
+            greatest_extent: self.list.greatest_extent(),
+            planet_radius: f64::INFINITY,
+        };
+        TilingParams::new(to_light, &slab, extinction)
+    }
+
+    /// Light number `at` of all particles, from lists in `order`.
+    fn run(
+        &mut self,
+        device: &mut Standalone,
+        order: ListOrder,
+        tiles: &TilingParams,
+        at: u32,
+        clouds: &Clouds,
+    ) -> Vec<[f32; LIGHT_CAPACITY]> {
+        let gpu = device.gpu().clone();
+        let tiling = Tiling::with_order(&gpu, 1, self.set.capacity(), 1 << 20, 2, order).unwrap();
+        let Self { list, set, pass } = self;
+        device.frames().state().forget();
+        device
+            .frames()
+            .run(|rec| {
+                list.record(rec, [0.0; 3], set)?;
+                tiling.record(rec, tiles, set)?;
+                pass.record(rec, at, (&tiling, rec.slot()), set, clouds)
+            })
+            .unwrap();
+        read(device, self.pass.incident(), self.list.count())
+    }
+}
+
+fn orders(device: &Standalone) -> Vec<ListOrder> {
+    let interlock = device.gpu().capabilities().supports(Feature::FragmentShaderInterlock).is_ok();
+    [ListOrder::Sort, ListOrder::Interlock].into_iter().take(1 + usize::from(interlock)).collect()
+}
+
+#[test]
+fn light_on_every_particle_of_a_list_is_the_references_and_the_same_from_interlock_and_sorting() {
+    let mut device = open();
+    let mut lit = Lit::new(&device, &heap(500));
+    let particles = lit.particles();
+    let forward = Forward::default();
+    let cases = [
+        Forward { ..forward.clone() },
+        Forward { splat: Splat::Polynomial, solid_angle: 1.5, ..forward.clone() },
+        Forward { phase: ForwardPhase::Scene, resolution: 32, ..forward.clone() },
+        Forward { resolution: 256, ..forward },
+    ];
+    for (case, forward) in cases.into_iter().enumerate() {
+        let clouds = Clouds { forward, albedo: 0.9, ..Clouds::default() };
+        for elevation in [90.0, 35.0, 4.0] {
+            let tiles = lit.tiles(to_light(elevation, 150.0), 0.03);
+            let expected = incident(&particles, &tiles, &pass_of(&clouds));
+            let mut before = None;
+            for order in orders(&device) {
+                let got = lit.run(&mut device, order, &tiles, 0, &clouds);
+                let (worst, least, greatest) = worst(&got, 0, &expected);
+                // Products of up to some hundred f32, each good to 1e-6 where a particle lets a hundredth pass.
+                assert!(worst < 1e-3, "case {case}, {elevation}°, {order:?}: {worst}");
+                assert!(least < 0.05 && greatest > 0.9, "there must be light and shade: {least} {greatest}");
+                let bits = got.iter().map(|light| light[0].to_bits()).collect::<Vec<_>>();
+                assert_eq!(*before.get_or_insert_with(|| bits.clone()), bits, "{order:?}");
+            }
+        }
+    }
+    silent(&device);
+}
+
+#[test]
+fn light_on_every_particle_of_a_grid_is_the_references() {
+    let mut setup = Setup::default();
+    setup.quality = Quality { cells: 24, rings: 3, layers: 3, ..Quality::default() };
+    setup.clouds.coverage = Coverage::Uniform(0.4);
+    let mut device = open();
+    let stages = Stages::new(&device, &setup);
+    let gpu = device.gpu().clone();
+    for elevation in [90.0, 35.0, 6.0] {
+        setup.to_sun = to_light(elevation, 150.0);
+        let counters = stages.run(&mut device, &setup);
+        let tiles = setup.tiling_params();
+        let particles: Vec<Particle> = read(&mut device, stages.set.particles(), counters.stored);
+        let pass = IncidentPass::new(&gpu, stages.set.capacity()).unwrap();
+        for order in orders(&device) {
+            let tiling = Tiling::with_order(&gpu, 3, stages.set.capacity(), 1 << 20, 2, order).unwrap();
+            device.frames().state().forget();
+            device
+                .frames()
+                .run(|rec| {
+                    tiling.record(rec, &tiles, &stages.set)?;
+                    pass.record(rec, 0, (&tiling, rec.slot()), &stages.set, &setup.clouds)
+                })
+                .unwrap();
+            let got: Vec<[f32; LIGHT_CAPACITY]> = read(&mut device, pass.incident(), counters.stored);
+            let expected = incident(&particles, &tiles, &pass_of(&setup.clouds));
+            let (worst, least, greatest) = worst(&got, 0, &expected);
+            // Places are good to 4 mm in f32, of particles that measure some 1000 m here.
+            assert!(worst < 1e-3, "{elevation}°, {order:?}, {} particles: {worst}", particles.len());
+            assert!(least < 0.5 && greatest > 0.9, "{least} {greatest}");
+        }
+    }
+    silent(&device);
+}
+
+#[test]
+fn each_of_several_lights_has_its_own_number_and_leaves_the_others_alone() {
+    let mut device = open();
+    let mut lit = Lit::new(&device, &heap(200));
+    let (particles, clouds) = (lit.particles(), Clouds::default());
+    let directions = [to_light(35.0, 150.0), [0.0, 1.0, 0.0], to_light(5.0, 20.0), to_light(-30.0, 300.0)];
+    let tiles = directions.map(|direction| lit.tiles(direction, 0.03));
+    let mut got = Vec::new();
+    for (at, tiles) in tiles.iter().enumerate() {
+        got = lit.run(&mut device, ListOrder::Sort, tiles, at as u32, &clouds);
+    }
+    for (at, tiles) in tiles.iter().enumerate() {
+        let (worst, ..) = worst(&got, at, &incident(&particles, tiles, &pass_of(&clouds)));
+        assert!(worst < 1e-3, "light {at}: {worst}"); // as for one
+    }
+    silent(&device);
+}
+
+#[test]
+fn the_serial_pass_blends_what_the_papers_say() {
+    let mut device = open();
+    let lit = Lit::new(&device, &heap(60));
+    let (particles, tiles) = (lit.particles(), lit.tiles(to_light(50.0, 150.0), 0.03));
+    let clouds = Clouds { albedo: 0.9, ..Clouds::default() };
+    let serial = Serial::new(&device.gpu().clone(), 32).unwrap();
+    let (got, _) = serial.run(device.frames(), &particles, &tiles, &clouds).unwrap();
+    let expected = as_published(&particles, &tiles, &pass_of(&clouds), 32);
+    let least = expected.iter().copied().fold(1.0, f64::min);
+    assert!(least < 0.2, "{least}");
+    for (index, (got, expected)) in got.iter().zip(&expected).enumerate() {
+        // Half floats are rounded to 2^-11 at each of up to some ten splats.
+        assert!((f64::from(*got) - expected).abs() < 5e-3, "particle {index}: {got}, expected {expected}");
+    }
+    silent(&device);
+}
