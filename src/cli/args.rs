@@ -341,6 +341,9 @@ pub struct BenchArgs {
     /// Compare with the same scene after replacing this value, in the same way; given again, all of them together
     #[arg(long, value_name = "KEY=VALUE")]
     pub vs_set: Vec<String>,
+    /// Compare lighting forward with the same done as Harris has it, one draw and one read-back a particle (docs/lighting.md)
+    #[arg(long, conflicts_with_all = ["vs", "vs_set"])]
+    pub serial_forward: bool,
     /// Frames measured per mode
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub measure: u32,

@@ -12,7 +12,7 @@ use super::args::{BenchArgs, Versus};
 use super::progress::{Progress, note};
 use super::session::{Device, Session};
 use super::summary::{PassTimes, median, median_bounds, p95};
-use super::{bench_parts, scenes};
+use super::{bench_parts, scenes, serial_forward};
 
 #[derive(Serialize)]
 struct Report {
@@ -138,6 +138,9 @@ impl Contender {
 
 pub fn run(args: &BenchArgs) -> Result<()> {
     let Some(scene) = &args.scene else { return bench_parts::run(args) };
+    if args.serial_forward {
+        return serial_forward::run(args, scene);
+    }
     let params = scenes::load(scene, &args.picture)?;
     let first = scenes::blended(params.clone(), args.blend, "--blend")?;
     let named = args.vs.iter().filter_map(|versus| match versus {

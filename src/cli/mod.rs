@@ -17,6 +17,7 @@ mod progress;
 mod reference;
 mod render;
 mod scenes;
+mod serial_forward;
 mod session;
 mod setup;
 mod summary;
