@@ -7,6 +7,8 @@ const uint PROFILE_HOMOGENEOUS = 0u;   // 1 everywhere
 const uint PROFILE_RADIAL = 1u;        // radial fall-off + noise
 const uint PROFILE_THRESHOLD = 2u;     // noise above a threshold that grows outwards
 const uint PROFILE_PYROCLASTIC = 3u;   // a ball whose surface is displaced by billows
+const uint PROFILE_GAUSSIAN = 4u;      // a Gaussian, lowered to 0 at the rim (Harris 2)
+const uint PROFILE_POLYNOMIAL = 5u;    // 2 r³ - 3 r² + 1 (Stoian 6)
 
 // PCG-3D hash (Jarzynski and Olano, "Hash Functions for GPU Rendering", 2020) of a lattice point, three words.
 uvec3 profile_hash(ivec3 cell, uint seed) {
@@ -69,7 +71,9 @@ float profile_density(vec3 p_us, uint style, uint seed) {
     if (r2 > 1.0) return 0.0;
     if (style == PROFILE_HOMOGENEOUS) return 1.0;
     float r = sqrt(r2);
-    // Every style ends softly over the last few hundredths of the radius, or silhouettes would alias in the table.
+    if (style == PROFILE_GAUSSIAN) return 1.0 - (1.0 - exp(-2.0 * r2)) * 1.15651764;   // 1 / (1 - e^-2)
+    if (style == PROFILE_POLYNOMIAL) return 1.0 - r2 * (3.0 - 2.0 * r);
+    // Every other style ends softly over the last few hundredths of the radius, or silhouettes would alias in the table.
     float rim = clamp((1.0 - r) * 25.0, 0.0, 1.0);
     if (style == PROFILE_RADIAL) {
         return rim * clamp(1.6 * (1.0 - r2) + 1.4 * (profile_fbm(p_us * 2.3 + 7.7, seed) - 0.5), 0.0, 1.0);

@@ -41,7 +41,7 @@ impl MediumParams {
             phase_function: phase_function(clouds.phase),
             albedo: clouds.albedo,
             crease: 0.5,
-            detail: 1.0,
+            detail: if clouds.style.displaced() { 1.0 } else { 0.0 },
             relief: 0.7,
             reserved_a: 0.0,
             reserved_b: 0.0,

@@ -696,7 +696,10 @@ mod tests {
             assert!(message.contains("expected A..B"), "{message}");
         }
         let message = render("a.toml --blend glass").unwrap_err();
-        assert!(message.contains("'glass' for '--blend") && message.contains("one of auto, exact, interlock"), "{message}");
+        assert!(
+            message.contains("'glass' for '--blend") && message.contains("one of auto, exact, interlock"),
+            "{message}"
+        );
         assert!(render("a.toml --exr-compression lzw").unwrap_err().contains("zip, zips, rle, piz, none"));
         assert!(render("a.toml --exr-type double").unwrap_err().contains("half, float"));
         assert!(render("a.toml --quality ultra").unwrap_err().contains("low, medium, high"));

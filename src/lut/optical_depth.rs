@@ -35,6 +35,8 @@ pub fn style_index(style: Style) -> u32 {
         Style::Radial => constants::PROFILE_RADIAL,
         Style::Threshold => constants::PROFILE_THRESHOLD,
         Style::Pyroclastic => constants::PROFILE_PYROCLASTIC,
+        Style::Gaussian => constants::PROFILE_GAUSSIAN,
+        Style::Polynomial => constants::PROFILE_POLYNOMIAL,
     }
 }
 

@@ -156,6 +156,8 @@ pub const STYLES: &[AxisValue<Style>] = &[
     here("radial", Style::Radial, "radial fall-off and noise"),
     here("threshold", Style::Threshold, "noise above a threshold"),
     here("homogeneous", Style::Homogeneous, "constant 1"),
+    here("gaussian", Style::Gaussian, "a smooth puff, a Gaussian (Harris)"),
+    here("polynomial", Style::Polynomial, "a smooth puff, 2 r³ − 3 r² + 1 (Stoian)"),
 ];
 
 /// `clouds.transfer`.

@@ -149,6 +149,18 @@ pub enum Style {
     Pyroclastic,
     /// Constant 1.
     Homogeneous,
+    /// A Gaussian with its standard deviation at half the radius, lowered to 0 at the rim (Harris 2).
+    Gaussian,
+    /// 2 r³ − 3 r² + 1 (Stoian 6).
+    Polynomial,
+}
+
+impl Style {
+    /// Whether detail noise displaces the surface: not where there is none, nor where density is the same all around.
+    #[must_use]
+    pub fn displaced(self) -> bool {
+        matches!(self, Self::Radial | Self::Threshold | Self::Pyroclastic)
+    }
 }
 
 /// The phase function.

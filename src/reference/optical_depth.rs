@@ -1,7 +1,8 @@
 //! Density profiles and optical depth of the reference particle in f64. GLSL twins: `glsl/lut/profile.glsl`,
 //! `glsl/lut/optical_depth.comp`.
 
-use crate::params::Style;
+use super::forward::opacity_share;
+use crate::params::{Splat, Style};
 use glam::{DVec3, IVec3};
 
 fn hash(cell: IVec3, seed: u32) -> [u32; 3] {
@@ -73,6 +74,8 @@ pub fn profile_density(p: DVec3, style: Style, seed: u32) -> f64 {
     let rim = ((1.0 - r) * 25.0).clamp(0.0, 1.0);
     match style {
         Style::Homogeneous => 1.0,
+        Style::Gaussian => opacity_share(r2, Splat::Gaussian),
+        Style::Polynomial => opacity_share(r2, Splat::Polynomial),
         Style::Radial => rim * (1.6 * (1.0 - r2) + 1.4 * (fbm(p * 2.3 + 7.7, seed) - 0.5)).clamp(0.0, 1.0),
         Style::Threshold => rim * (6.0 * (fbm(p * 2.6 + 3.1, seed) - (0.18 + 0.42 * r2))).clamp(0.0, 1.0),
         Style::Pyroclastic => {
@@ -92,6 +95,32 @@ pub fn mean_density(entry: DVec3, dir: DVec3, style: Style, seed: u32, steps: u3
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn puffs_of_the_papers_have_the_closed_forms_of_their_chords() {
+        use glam::DVec3;
+        // Half of ∫ (b² + t²)^(3/2) dt over the chord, whose ends have b² + t² = 1.
+        let cubes = |b: f64, h: f64| 0.25 * h + 0.375 * b * b * h + 0.375 * b.powi(4) * (h / b).asinh();
+        for b in [0.05f64, 0.3, 0.6, 0.95] {
+            let h = (1.0 - b * b).sqrt();
+            let polynomial = h - 3.0 * (b * b * h + h.powi(3) / 3.0) + 2.0 * cubes(b, h);
+            let mean = |style| mean_density(DVec3::new(b, 0.0, -h), DVec3::Z, style, 0, 2000);
+            // The midpoint rule: (2 h / 2000)² / 24 times a second derivative below 12.
+            assert!((mean(Style::Polynomial) - polynomial / h).abs() < 1e-6, "{b}");
+            // √(π/8) e^(-2 b²) erf(√2 h) by the series of erf.
+            let x = std::f64::consts::SQRT_2 * h;
+            let mut term = x;
+            let mut erf = x;
+            for n in 1..60 {
+                term *= -x * x / f64::from(n);
+                erf += term / f64::from(2 * n + 1);
+            }
+            erf *= 2.0 / std::f64::consts::PI.sqrt();
+            let rim = (-2.0f64).exp();
+            let gaussian = (std::f64::consts::PI / 8.0).sqrt() * (-2.0 * b * b).exp() * erf - h * rim;
+            assert!((mean(Style::Gaussian) - gaussian / (h * (1.0 - rim))).abs() < 1e-6, "{b}");
+        }
+    }
 
     #[test]
     fn particles_are_compact_and_mostly_full_in_every_style() {

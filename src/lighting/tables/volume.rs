@@ -223,7 +223,7 @@ impl VolumeMedium {
 
     /// The same with the mean of the profile known, which takes thousands of noise values.
     pub(crate) fn with_mean(clouds: &Clouds, fill: f32, mean: f32) -> Self {
-        let body = if clouds.style == Style::Homogeneous { 1.0 } else { DISPLACED };
+        let body = if clouds.style.displaced() { DISPLACED } else { 1.0 };
         Self {
             extinction: clouds.sigma_t * mean * body.powi(3),
             albedo: clouds.albedo,
