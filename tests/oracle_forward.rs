@@ -147,7 +147,7 @@ fn light_on_every_particle_of_a_list_is_the_references_and_the_same_from_interlo
             for order in orders(&device) {
                 let got = lit.run(&mut device, order, &tiles, 0, &clouds);
                 let (worst, least, greatest) = worst(&got, 0, &expected);
-                // Products of up to some hundred f32, each good to 1e-6 where a particle lets a hundredth pass.
+                // Found below 3e-5. Vulkan lets exp(-τ) err by 3 + 2 τ ulp, 3e-6 at τ = 10, in each of some hundred factors.
                 assert!(worst < 1e-3, "case {case}, {elevation}°, {order:?}: {worst}");
                 assert!(least < 0.05 && greatest > 0.9, "there must be light and shade: {least} {greatest}");
                 let bits = got.iter().map(|light| light[0].to_bits()).collect::<Vec<_>>();
@@ -221,10 +221,10 @@ fn the_serial_pass_blends_what_the_papers_say() {
     let (got, _) = serial.run(device.frames(), &particles, &tiles, &clouds).unwrap();
     let expected = as_published(&particles, &tiles, &pass_of(&clouds), 32);
     let least = expected.iter().copied().fold(1.0, f64::min);
-    assert!(least < 0.2, "{least}");
+    assert!(least < 0.5, "there must be shade: {least}");
     for (index, (got, expected)) in got.iter().zip(&expected).enumerate() {
-        // Half floats are rounded to 2^-11 at each of up to some ten splats.
-        assert!((f64::from(*got) - expected).abs() < 5e-3, "particle {index}: {got}, expected {expected}");
+        // Found below 1e-3. Half floats are rounded by up to 2^-12 at each of up to some ten splats.
+        assert!((f64::from(*got) - expected).abs() < 2e-3, "particle {index}: {got}, expected {expected}");
     }
     silent(&device);
 }

@@ -297,7 +297,7 @@ impl CloudKeys {
         set(&mut forward.solid_angle, self.forward_solid_angle);
         set(&mut forward.resolution, self.forward_resolution);
         if let Some(lights) = &self.light {
-            let lights = lights.iter().enumerate().map(|(index, light)| light.into_light(index));
+            let lights = lights.iter().enumerate().map(|(index, light)| light.read(index));
             forward.lights = lights.collect::<Result<_>>()?;
         }
         Ok(forward)
@@ -367,7 +367,7 @@ impl CloudKeys {
 }
 
 impl LightKeys {
-    fn into_light(&self, index: usize) -> Result<Light> {
+    fn read(&self, index: usize) -> Result<Light> {
         let field = |key: &str| format!("clouds.light[{index}].{key}");
         let mut from = LightFrom::Own;
         set_named(&mut from, self.from.as_ref(), |name| lookup(LIGHT_FROMS, &field("from"), name))?;
