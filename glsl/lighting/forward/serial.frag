@@ -20,6 +20,6 @@ layout(push_constant) uniform SerialPush {
 void main() {
     float across = push.outline.x * from_middle.x + push.outline.y * from_middle.y;
     float along = push.outline.z * from_middle.y;
-    float share = 1.0 - splat_rest(across * across + along * along, push.profile);
+    float share = 1.0 - splat_rest(vec4(across * across + along * along), push.profile).x;
     light = share * vec4(vec3(push.colour), push.opacity);
 }
