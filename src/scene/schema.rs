@@ -9,9 +9,9 @@ use super::particles::ParticleKeys;
 use super::{coverage, particles};
 use crate::params::check;
 use crate::params::{
-    Aim, Animation, Camera, CameraKey, Clouds, Coverage, FORWARD_PHASES, Film, Forward, Ground, LIGHT_FROMS, LIGHTINGS, Light,
-    LightFrom, PHASES, Params, Precision, Preset, Quality, SOURCES, SPLATS, STYLES, Sky, SkyModel, Source, SourceKind,
-    Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
+    Aim, Animation, Camera, CameraKey, Clouds, Coverage, FORWARD_PHASES, Film, Forward, Ground, LIGHT_FROMS, LIGHTINGS,
+    Light, LightFrom, PHASES, Params, Precision, Preset, Quality, SOURCES, SPLATS, STYLES, Sky, SkyModel, Source,
+    SourceKind, Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
 };
 use crate::{Error, Result};
 
