@@ -240,6 +240,7 @@ pub mod params;
 pub mod pathtrace;
 pub mod reference;
 pub mod renderer;
+pub mod scatter;
 #[cfg(feature = "files")]
 pub mod scene;
 pub mod shared;

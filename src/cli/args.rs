@@ -27,6 +27,8 @@ pub enum Command {
     Precompute(PrecomputeArgs),
     /// Write the extinction of a scene's clouds on a grid of voxels, for other renderers (docs/outside-renderers.md)
     Voxelize(VoxelizeArgs),
+    /// Make a field of cumulus out of particles: a CSV file for scenes with `clouds.source = "particles"`
+    Scatter(ScatterArgs),
     /// Path trace a scene: the unbiased truth of what `render` approximates
     Reference(ReferenceArgs),
     /// Measure the GPU time of each pass: median and 95th percentile
@@ -250,6 +252,34 @@ pub struct VoxelizeArgs {
     pub quality: Option<QualityArg>,
     #[command(flatten)]
     pub args: SceneArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct ScatterArgs {
+    /// CSV file: one particle a line, with the number of its cloud (docs/scene.md)
+    #[arg(short, long, value_name = "OUT.csv")]
+    pub output: PathBuf,
+    /// Clouds
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub clouds: u32,
+    /// Particles of all clouds together
+    #[arg(long, value_name = "N", default_value_t = 50_000)]
+    pub particles: u32,
+    /// Another seed is another field
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u32,
+    /// Edge of the square that cloud bases lie in, around the origin [m]
+    #[arg(long, value_name = "M", default_value_t = 10_000.0)]
+    pub extent: f64,
+    /// Altitude of the bases [m]
+    #[arg(long, value_name = "M", default_value_t = 1500.0)]
+    pub base: f64,
+    /// Median radius of a cloud at its base [m]
+    #[arg(long, value_name = "M", default_value_t = 400.0)]
+    pub radius: f64,
+    /// Density of the particles, relative to the scene's sigma_t
+    #[arg(long, value_name = "D", default_value_t = 0.3)]
+    pub density: f64,
 }
 
 /// Least and greatest corner of a box [m].

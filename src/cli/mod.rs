@@ -16,6 +16,7 @@ mod prefix;
 mod progress;
 mod reference;
 mod render;
+mod scatter;
 mod scenes;
 mod serial_forward;
 mod session;
@@ -60,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(args).map(Outcome::done),
         Command::Precompute(args) => precompute::run(args),
         Command::Voxelize(args) => voxelize::run(args),
+        Command::Scatter(args) => scatter::run(args).map(Outcome::done),
         Command::Reference(args) => reference::run(args),
         Command::Bench(args) => bench::run(args).map(Outcome::done),
         Command::Ab(args) => ab::run(args).map(Outcome::of),

@@ -6,6 +6,7 @@
 mod atomic;
 mod exr;
 mod npy;
+mod particles;
 mod picture;
 mod stats;
 mod table;
@@ -16,6 +17,7 @@ use std::path::Path;
 pub use atomic::{AtomicFile, write_atomic};
 pub use exr::{ExrChannel, ExrCompression, ExrOptions, ExrType, colour as exr_colour, write as write_exr};
 pub use npy::NpyVolume;
+pub use particles::write_particles;
 pub(crate) use picture::encode_png;
 pub use picture::{Format, Picture, PngDepth, numbered, transmittance_path};
 pub use stats::{BlendStats, CapacityStats, DeviceStats, FrameStats, ParticleStats, PassStats, Stats, TableStats};

@@ -81,6 +81,8 @@ pub struct ParticleDesc {
     pub colour: [f32; 3],
     /// Motion of its own, besides the wind [m/s].
     pub velocity: [f64; 3],
+    /// Which cloud the particle is part of; a list that says nothing is one cloud, 0.
+    pub cloud: u32,
 }
 
 impl Default for ParticleDesc {
@@ -92,6 +94,7 @@ impl Default for ParticleDesc {
             density: 1.0,
             colour: [1.0; 3],
             velocity: [0.0; 3],
+            cloud: 0,
         }
     }
 }

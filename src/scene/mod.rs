@@ -5,7 +5,7 @@
 //! from the command line, the error names the flag instead. Paths inside a scene are relative to the scene file.
 
 mod coverage;
-mod particles;
+pub(crate) mod particles;
 mod schema;
 mod source;
 
