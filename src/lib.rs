@@ -174,6 +174,11 @@
 //!   (`tests/oracle_lighting.rs::layer_one_is_smoothed_with_the_layer_below_it`)
 //! - **Every particle is lit**, seen or not: light must not change when the camera turns.
 //!   (`tests/oracle_lighting.rs::smoothing_and_skylight_are_those_of_the_reference`)
+//! - **Shadows can be had from a volume** (Shimada et al., *Real-time Rendering of Dynamic Clouds*), of which the paper draws
+//!   every particle into all slices behind it. Here a particle adds the ends of its optical depths' ramps, as integers, and two sums along
+//!   the light make the rest: the same volume for its area alone. What is scattered more than once is two streams along the
+//!   sun's ray; the paper says nothing of it. (`tests/oracle_attenuation.rs::every_voxel_of_a_heap_in_a_high_sun_and_of_a_field_in_a_low_one_is_that_of_the_reference`,
+//!   `tests/oracle_attenuation.rs::the_order_of_particles_changes_no_bit`)
 //!
 //! Forward scattering (Harris 2.2–2.3, Stoian 3–4; `docs/lighting.md`):
 //! - **What goes on forward is albedo × (1 − e^−τ) × the phase function over the cone γ**, the papers' albedo × τ × p γ / 4π for

@@ -16,7 +16,7 @@ use crate::lists::ListUse;
 use crate::params::{Animation, Camera, Params, SkyModel, Style, Sun, SunPosition};
 use crate::shared::FrameParams;
 use crate::source::{self, ParticleSource, Place};
-use crate::tiling::{NODES_PER_PARTICLE, Tiling, TilingParams};
+use crate::tiling::{NODES_PER_PARTICLE, TileNode, Tiling, TilingParams};
 
 /// The clouds and the air of a frame. [`View`](crate::view::View)s look at it.
 pub struct Sky {
@@ -54,7 +54,9 @@ impl Sky {
         params.validate()?;
         let source = source::open(gpu, params, slots)?;
         let set = ParticleSet::new(gpu, source.capacity())?;
-        let nodes = set.capacity().saturating_mul(NODES_PER_PARTICLE);
+        // A million particles make do with fewer each: they are small.
+        let most = gpu.capabilities().max_storage_buffer_range / size_of::<TileNode>() as u32;
+        let nodes = set.capacity().saturating_mul(NODES_PER_PARTICLE).min(most);
         let (spread, levels) = (source.spread(), source.levels());
         let setting = lighting::Setting { gpu, params, spread, capacity: set.capacity(), levels, slots };
         let frame = (0..slots)

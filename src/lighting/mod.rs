@@ -7,6 +7,7 @@
 //!
 //! Shaders of any method get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
 
+pub mod attenuation;
 mod flat;
 pub mod forward;
 pub mod tables;
@@ -106,10 +107,9 @@ pub(crate) fn open(setting: &Setting<'_>) -> Result<Box<dyn Method>> {
         Lighting::Tables => Ok(Box::new(tables::TableLight::new(setting)?)),
         Lighting::Flat => Ok(Box::new(flat::Flat)),
         Lighting::Forward => Ok(Box::new(forward::ForwardLight::new(setting)?)),
-        later @ (Lighting::Attenuation
-        | Lighting::March
-        | Lighting::MarchCached
-        | Lighting::MarchMulti
-        | Lighting::Path) => panic!("validation has let the lighting method {} pass", later.name()),
+        Lighting::Attenuation => Ok(Box::new(attenuation::AttenuationLight::new(setting)?)),
+        later @ (Lighting::March | Lighting::MarchCached | Lighting::MarchMulti | Lighting::Path) => {
+            panic!("validation has let the lighting method {} pass", later.name())
+        }
     }
 }

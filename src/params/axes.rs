@@ -3,7 +3,7 @@
 //! Scene files, `welkin devices`, `docs/scene.md` and the errors for what is not here or does not go together are made from
 //! these tables.
 
-use super::{Blend, ForwardPhase, LightFrom, Lighting, Params, Phase, Source, Splat, Style, Transfer};
+use super::{Blend, ForwardPhase, LightFrom, Lighting, OcclusionMode, Params, Phase, Source, Splat, Style, Transfer};
 use crate::{Error, Result};
 
 /// One name of an axis.
@@ -116,7 +116,7 @@ pub const LIGHTINGS: &[LightingMethod] = &[
         reads_tables: false,
     },
     LightingMethod {
-        axis: later("attenuation", Lighting::Attenuation, "transmittance in a volume, summed in any order"),
+        axis: here("attenuation", Lighting::Attenuation, "shadows in a volume, summed in any order"),
         sources: PARTICLES,
         reads_tables: false,
     },
@@ -164,6 +164,12 @@ pub const STYLES: &[AxisValue<Style>] = &[
 pub const TRANSFERS: &[AxisValue<Transfer>] = &[
     here("diffusion", Transfer::Diffusion, "light diffuses through all particles"),
     here("exponential", Transfer::Exponential, "light fades as exp(-ξ τ)"),
+];
+
+/// `clouds.occlusion`.
+pub const OCCLUSIONS: &[AxisValue<OcclusionMode>] = &[
+    here("points", OcclusionMode::Points, "at three points of each particle"),
+    here("volume", OcclusionMode::Volume, "in every pixel, from a volume"),
 ];
 
 /// `clouds.phase`.

@@ -42,11 +42,19 @@ pub struct Clouds {
     /// How much light a particle of the grid shares with each of its neighbours, against 1 of its own, 0 to 10 (Yusov 5.3,
     /// step 3). Default 0: no gain against path tracing (`docs/accuracy.md`).
     pub smoothing: f32,
+    /// Where sunlight that other particles let through is found for [`Lighting::Tables`]. Default [`OcclusionMode::Points`].
+    pub occlusion: OcclusionMode,
+    /// Voxels along an edge of the volume of [`Lighting::Attenuation`] and [`OcclusionMode::Volume`], 32 to 384 (Shimada 4).
+    /// Default 128.
+    pub attenuation_resolution: u32,
     /// No particle is made farther from the camera than this [m]. Default 1e5 (the authors' scene).
     pub particle_cutoff: f32,
     /// How [`Lighting::Forward`] lights them.
     pub forward: Forward,
 }
+
+/// What [`Clouds::attenuation_resolution`] may be (Shimada 4).
+pub const ATTENUATION_RESOLUTIONS: std::ops::RangeInclusive<u32> = 32..=384;
 
 /// Where particles come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,6 +149,15 @@ impl Transfer {
     }
 }
 
+/// Where the sunlight that other particles let through to one is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OcclusionMode {
+    /// At three points of each particle: both poles towards the sun, and the centre.
+    Points,
+    /// In every pixel, from the volume of [`Lighting::Attenuation`].
+    Volume,
+}
+
 /// The density inside a particle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
@@ -221,6 +238,8 @@ impl Default for Clouds {
             transfer: Transfer::Diffusion,
             xi: Transfer::Diffusion.xi(),
             smoothing: 0.0,
+            occlusion: OcclusionMode::Points,
+            attenuation_resolution: 128,
             particle_cutoff: 1.0e5,
             forward: Forward::default(),
         }
@@ -258,6 +277,7 @@ impl Clouds {
         check::within("clouds.xi", self.xi, 0.0..=1.0, "")?;
         check::within("clouds.smoothing", self.smoothing, 0.0..=10.0, "")?;
         self.forward.validate()?;
+        check::within("clouds.attenuation_resolution", self.attenuation_resolution, ATTENUATION_RESOLUTIONS, "")?;
         check::within("clouds.particle_cutoff", self.particle_cutoff, 1.0e3..=1.0e6, "m")
     }
 }

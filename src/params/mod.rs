@@ -20,11 +20,14 @@ mod sun;
 
 pub use animation::{Animation, CameraKey, CloudMotion, WIND_LAYERS};
 pub use axes::{
-    AxisValue, BLENDS, FORWARD_PHASES, LIGHT_FROMS, LIGHTINGS, LightingMethod, PHASES, Row, SOURCES, SPLATS, STYLES,
-    SourceKind, TRANSFERS, lightings_of, lookup,
+    AxisValue, BLENDS, FORWARD_PHASES, LIGHT_FROMS, LIGHTINGS, LightingMethod, OCCLUSIONS, PHASES, Row, SOURCES,
+    SPLATS, STYLES, SourceKind, TRANSFERS, lightings_of, lookup,
 };
 pub use camera::{Aim, Basis, Camera};
-pub use clouds::{Clouds, Coverage, CoverageMap, Lighting, ParticleDesc, Phase, Source, Style, Transfer};
+pub use clouds::{
+    ATTENUATION_RESOLUTIONS, Clouds, Coverage, CoverageMap, Lighting, OcclusionMode, ParticleDesc, Phase, Source,
+    Style, Transfer,
+};
 pub use forward::{Forward, ForwardPhase, LIGHT_CAPACITY, Light, LightFrom, Splat};
 pub use quality::{Blend, Precision, Preset, Quality, WINDOWS};
 pub use sky::{Film, Ground, Sky, SkyModel, ToneCurve};
@@ -160,6 +163,7 @@ mod tests {
         assert_eq!(blamed(|p| p.clouds.g_single = 1.0), "clouds.g_single");
         assert_eq!(blamed(|p| p.clouds.albedo = 1.5), "clouds.albedo");
         assert_eq!(blamed(|p| p.clouds.particle_cutoff = f32::INFINITY), "clouds.particle_cutoff");
+        assert_eq!(blamed(|p| p.clouds.attenuation_resolution = 16), "clouds.attenuation_resolution");
         assert_eq!(blamed(|p| p.quality.downscale = 3), "quality.downscale");
         assert_eq!(blamed(|p| p.quality.cells = 100), "quality.cells");
         assert_eq!(blamed(|p| p.film.exposure_ev = f32::INFINITY), "film.exposure_ev");

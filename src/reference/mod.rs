@@ -1,6 +1,7 @@
 //! The oracles: one plain file per stage, without Vulkan. Tests compare every stage of the device with these.
 
 pub mod atmosphere;
+pub mod attenuation;
 pub mod compact;
 pub mod comparison;
 pub mod density;

@@ -20,7 +20,8 @@ const WITHOUT_COLOUR: usize = 11;
 /// Slot of the cloud.
 const CLOUD: usize = 17;
 /// Numbers of columns that a file does not have: a white colour, at rest, cloud 0.
-const DEFAULTS: [f64; COLUMNS.len()] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+const DEFAULTS: [f64; COLUMNS.len()] =
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
 /// Which columns lines of 11, 12, 14, 15, 17 and 18 numbers have.
 const LAYOUTS: [&[usize]; 6] = [
     &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10],
@@ -151,7 +152,8 @@ fn parse_line(line: &str, first: bool) -> Result<Option<ParticleDesc>, Fault> {
     // Columns are counted when something is wrong.
     let column = |slot: usize| 1 + cells[..slot].iter().map(|cell| cell.chars().count() + 1).sum::<usize>();
     let Some(layout) = LAYOUTS.iter().find(|layout| layout.len() == count) else {
-        let expected = format!("11, 12, 14, 15, 17 or 18: {}[,r,g,b[,vx,vy,vz]][,cloud]", COLUMNS[..WITHOUT_COLOUR].join(","));
+        let expected =
+            format!("11, 12, 14, 15, 17 or 18: {}[,r,g,b[,vx,vy,vz]][,cloud]", COLUMNS[..WITHOUT_COLOUR].join(","));
         return Err((1, format!("{count} columns: expected {expected}")));
     };
     let names = || layout.iter().map(|&slot| COLUMNS[slot]);
@@ -252,7 +254,8 @@ mod tests {
         let good = "0,0,0,1,1,1,0,0,0,1,1\n";
         assert_eq!(complaint(&format!("{good}0,0,0,1,1,x,0,0,0,1,1")), "cloud.csv:2:11: rz = \"x\": expected a number");
         assert!(
-            complaint(&format!("{good}\n1,2,3")).starts_with("cloud.csv:3:1: 3 columns: expected 11, 12, 14, 15, 17 or 18")
+            complaint(&format!("{good}\n1,2,3"))
+                .starts_with("cloud.csv:3:1: 3 columns: expected 11, 12, 14, 15, 17 or 18")
         );
         assert!(complaint("0,0,0,1,1,1,0,0,0,0,1").starts_with("cloud.csv:1:13: qx,qy,qz,qw: expected a quaternion"));
         assert!(complaint("0,0,0,1,-1,1,0,0,0,1,1").contains("cloud.csv:1:1: the particle.radii[1] = -1"));

@@ -10,8 +10,8 @@ use super::{coverage, particles};
 use crate::params::check;
 use crate::params::{
     Aim, Animation, Camera, CameraKey, Clouds, Coverage, FORWARD_PHASES, Film, Forward, Ground, LIGHT_FROMS, LIGHTINGS,
-    Light, LightFrom, PHASES, Params, Precision, Preset, Quality, SOURCES, SPLATS, STYLES, Sky, SkyModel, Source,
-    SourceKind, Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
+    Light, LightFrom, OCCLUSIONS, PHASES, Params, Precision, Preset, Quality, SOURCES, SPLATS, STYLES, Sky, SkyModel,
+    Source, SourceKind, Sun, SunPosition, TRANSFERS, ToneCurve, lookup, solar,
 };
 use crate::{Error, Result};
 
@@ -73,6 +73,8 @@ struct CloudKeys {
     transfer: Option<String>,
     xi: Option<f32>,
     smoothing: Option<f32>,
+    occlusion: Option<String>,
+    attenuation_resolution: Option<u32>,
     particle_cutoff: Option<f32>,
     light: Option<Vec<LightKeys>>,
     splat: Option<String>,
@@ -281,6 +283,8 @@ impl CloudKeys {
         set_named(&mut clouds.transfer, self.transfer.as_ref(), |name| lookup(TRANSFERS, "clouds.transfer", name))?;
         clouds.xi = self.xi.unwrap_or(clouds.transfer.xi());
         set(&mut clouds.smoothing, self.smoothing);
+        set_named(&mut clouds.occlusion, self.occlusion.as_ref(), |name| lookup(OCCLUSIONS, "clouds.occlusion", name))?;
+        set(&mut clouds.attenuation_resolution, self.attenuation_resolution);
         set(&mut clouds.particle_cutoff, self.particle_cutoff);
         clouds.forward = self.forward()?;
         clouds.coverage = self.coverage(base, note)?;

@@ -149,7 +149,8 @@ fn faults_of_overrides_name_the_flag() {
 fn choices_of_later_versions_are_unsupported() {
     let error = read("[clouds]\nlighting = \"march\"", &[]).unwrap_err();
     assert!(matches!(error, Error::Unsupported { .. }));
-    let expected = "clouds.lighting = \"march\" is not supported by this version yet (it has tables, flat, forward)";
+    let expected =
+        "clouds.lighting = \"march\" is not supported by this version yet (it has tables, flat, forward, attenuation)";
     assert_eq!(error.to_string(), expected);
 }
 
@@ -223,8 +224,15 @@ fn the_scenes_of_the_repository_are_valid() {
     for entry in std::fs::read_dir(directory).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "toml") {
-            load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-            count += 1;
+            match load(&path, &[]) {
+                Ok(_) => count += 1,
+                // Lists of many particles are made, not kept; the scene tells how.
+                Err(error) if std::fs::read_to_string(&path).unwrap().contains("welkin scatter -o scenes/") => {
+                    let message = error.to_string();
+                    assert!(message.contains(".csv") && message.contains("`welkin scatter` makes"), "{message}");
+                }
+                Err(error) => panic!("{error}"),
+            }
         }
     }
     assert!(count >= 7, "{count} scenes");

@@ -6,11 +6,12 @@ pub mod volume;
 
 use std::sync::Arc;
 
-use super::{Lent, Method, Scene, Seen, Setting};
+use super::attenuation::volume::{AttenuationDesign, AttenuationVolume};
+use super::{Lent, Method, Scene, Seen, Setting, attenuation};
 use crate::Result;
 use crate::gpu::{Gpu, Recorder, Resource, Sampler};
 use crate::grid::{Counters, ParticleSet};
-use crate::params::{Clouds, Transfer};
+use crate::params::{Clouds, OcclusionMode, Transfer};
 use crate::source::Spread;
 
 pub use occlusion::Occlusion;
@@ -20,6 +21,8 @@ use volume::{LightVolume, VolumeDesign, VolumeMedium, VolumePlace, mean_profile}
 pub(super) struct TableLight {
     occlusion: Occlusion,
     volume: LightVolume,
+    /// Shadows in every pixel, where the scene asks for them.
+    shadows: AttenuationVolume,
     /// Mean density of a particle over its ball.
     mean_profile: f32,
 }
@@ -27,9 +30,12 @@ pub(super) struct TableLight {
 impl TableLight {
     pub(super) fn new(setting: &Setting<'_>) -> Result<Self> {
         let clouds = &setting.params.clouds;
+        let shadows = (clouds.occlusion == OcclusionMode::Volume)
+            .then(|| AttenuationDesign::new(&setting.spread, clouds.attenuation_resolution));
         Ok(Self {
             occlusion: Occlusion::new(setting.gpu, setting.capacity)?,
             volume: LightVolume::new(setting.gpu, volume_design(clouds, &setting.spread), setting.slots)?,
+            shadows: AttenuationVolume::new(setting.gpu, shadows, setting.params.quality.precision, setting.slots)?,
             mean_profile: mean_profile(clouds.style),
         })
     }
@@ -52,21 +58,18 @@ impl Method for TableLight {
         rec.pass("lighting", |rec| {
             self.occlusion.record(rec, scene.tiling, set, scene.cells, clouds, self.volume.voxel_edge())
         })?;
+        if clouds.occlusion == OcclusionMode::Volume {
+            let medium = attenuation::volume::medium(clouds, self.mean_profile);
+            let place = VolumePlace::of(scene);
+            rec.pass("attenuation", |rec| self.shadows.record(rec, &place, &medium, set))?;
+        }
         match clouds.transfer {
             Transfer::Exponential => {
                 self.volume.record_none(rec);
                 Ok(())
             }
             Transfer::Diffusion => {
-                let (origin, [east, south]) = (scene.place.origin, scene.drift);
-                let place = VolumePlace {
-                    centre: scene.layer.centre,
-                    // Voxels drift with the clouds, so that their light does not flicker.
-                    origin: [origin[0] - east, origin[1], origin[2] - south],
-                    base: scene.layer.base,
-                    planet_radius: scene.layer.planet_radius,
-                    to_sun: scene.to_sun,
-                };
+                let place = VolumePlace::of(scene);
                 let medium = VolumeMedium::with_mean(clouds, scene.fill, self.mean_profile);
                 rec.pass("light volume", |rec| {
                     self.volume.record(rec, &place, &medium, set, self.occlusion.sun_depths())
@@ -91,6 +94,8 @@ impl Method for TableLight {
             ("scattering_lut", Resource::Sampled(lent.scattering.sampled(Sampler::LinearClamp))),
             ("volume", Resource::Buffer(self.volume.params(lent.slot))),
             ("light_volume", Resource::Sampled(self.volume.image().sampled(Sampler::LinearClamp))),
+            ("attenuation", Resource::Buffer(self.shadows.params(lent.slot))),
+            ("attenuation_volume", Resource::Sampled(self.shadows.image().sampled(Sampler::LinearClamp))),
         ]
     }
 

@@ -15,6 +15,7 @@ use crate::compact::Compact;
 use crate::definitions::REFERENCE_SEED;
 use crate::gpu::{Buffer, BufferKind, ComputePipeline, Gpu, Image, ImageDesc, Recorder};
 use crate::grid::ParticleSet;
+use crate::lighting::Scene;
 use crate::params::{Clouds, Style};
 use crate::reference::optical_depth::profile_density;
 use crate::reference::phase::PhaseFunction;
@@ -191,6 +192,21 @@ pub struct VolumePlace {
     pub planet_radius: f64,
     /// Unit direction towards the sun.
     pub to_sun: [f64; 3],
+}
+
+impl VolumePlace {
+    /// That of a frame.
+    pub(crate) fn of(scene: &Scene<'_>) -> Self {
+        let (origin, [east, south]) = (scene.place.origin, scene.drift);
+        Self {
+            centre: scene.layer.centre,
+            // Voxels drift with the clouds, so that their light does not flicker.
+            origin: [origin[0] - east, origin[1], origin[2] - south],
+            base: scene.layer.base,
+            planet_radius: scene.layer.planet_radius,
+            to_sun: scene.to_sun,
+        }
+    }
 }
 
 /// What the particles are made of.
