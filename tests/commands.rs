@@ -160,6 +160,18 @@ fn bench_compares_values_of_the_scene_in_one_run() {
 }
 
 #[test]
+fn bench_measures_forward_scattering_against_one_read_back_a_particle() {
+    let directory = directory(FLAT);
+    let line = "bench sky.toml --size 32x16 --serial-forward --measure 2 --warmup 0 --json";
+    let report: serde_json::Value = serde_json::from_str(&stdout(&run(directory.path(), line))).unwrap();
+    let [serial, forward, ratio] = ["serial_ms", "forward_ms", "ratio"].map(|key| report[key].as_f64().unwrap());
+    assert!(report["particles"] == 1 && serial > 0.0 && forward > 0.0 && (ratio * forward / serial - 1.0).abs() < 1e-9);
+
+    std::fs::write(directory.path().join("sky.toml"), "").unwrap();
+    refused(directory.path(), "bench sky.toml --serial-forward", &["--serial-forward", "lists of particles"]);
+}
+
+#[test]
 fn tables_are_made_once_read_from_the_cache_and_made_anew_when_damaged() {
     let directory = directory("");
     let cache = directory.path().join("cache");

@@ -2,6 +2,7 @@
 
 #[path = "support/clouds.rs"]
 mod clouds;
+mod support;
 
 use clouds::{Setup, Stages, open, read, silent};
 use glam::{DQuat, EulerRot};
@@ -227,4 +228,54 @@ fn the_serial_pass_blends_what_the_papers_say() {
         assert!((f64::from(*got) - expected).abs() < 2e-3, "particle {index}: {got}, expected {expected}");
     }
     silent(&device);
+}
+
+/// A ball in two lights, in one of them below another ball.
+const SHADED: &str = r#"
+camera = { position = [0, 1000, 0], look_at = [0, 1000, -600], fov_y = 20 }
+sky = { model = "none" }
+quality = { downscale = 1, precision = "f32" }
+[clouds]
+source = "particles"
+lighting = "forward"
+style = "homogeneous"
+sigma_t = 0.07
+albedo = 0.9
+forward_solid_angle = 1e-6
+particle = [
+    { centre = [0, 1000, -600], radii = [100, 100, 100], density = 0.1 },
+    { centre = [0, 1300, -600], radii = [100, 100, 100], density = 0.05 },
+]
+light = [
+    { direction = [0, 1, 0], colour = [2, 1, 0.5] },
+    { direction = [0.6, 0, 0.8], colour = [0.2, 0.4, 0.8] },
+    { from = "sky" },
+]
+"#;
+
+#[test]
+fn a_ball_shows_what_comes_in_of_each_light_scattered_once_to_the_eye() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sky.toml"), SHADED).unwrap();
+    let picture = folder.path().join("out.npy");
+    let output = support::welkin()
+        .arg("render")
+        .arg(folder.path().join("sky.toml"))
+        .arg("-o")
+        .arg(&picture)
+        .args(["--size", "65x65"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let bytes = std::fs::read(picture).unwrap();
+    let radiance: Vec<f32> = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
+    // Through the middle of the ball, optical depth 1.4; that of the other along the light is 0.7.
+    let rayleigh = |cos: f64| 0.75 * (1.0 + cos * cos) / (4.0 * std::f64::consts::PI);
+    let [above, beside] = [rayleigh(0.0) * (-0.7f64).exp(), rayleigh(-0.8)];
+    for (i, (first, second)) in [(2.0, 0.2), (1.0, 0.4), (0.5, 0.8)].into_iter().enumerate() {
+        let expected = 0.9 * (above * first + beside * second) * (1.0 - (-1.4f64).exp());
+        let got = f64::from(radiance[(32 * 65 + 32) * 3 + i]);
+        // The square that it reads is 0.4 m wide, of a splat of 200 m: 1e-5 of its opacity.
+        assert!((got / expected - 1.0).abs() < 1e-4, "{i}: {got}, expected {expected}");
+    }
 }
