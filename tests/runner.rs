@@ -37,3 +37,35 @@ fn an_unknown_driver_is_an_error_that_names_the_choices() {
         stderr(&output)
     );
 }
+
+/// A program that was installed finds the driver that setup has unpacked.
+#[test]
+fn a_program_on_a_system_without_a_driver_starts_again_on_a_prefix() {
+    if !drivers().contains(&Driver::Lavapipe) {
+        return; // Nothing is unpacked.
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("welkin");
+    std::fs::copy(env!("CARGO_BIN_EXE_welkin"), &program).unwrap();
+    let scene = "[clouds]\nsource = \"particles\"\nlighting = \"flat\"\nstyle = \"homogeneous\"\n\
+                 [[clouds.particle]]\ncentre = [0, 1000, -2000]\nradii = [400, 300, 400]\n";
+    std::fs::write(folder.path().join("sky.toml"), scene).unwrap();
+    let render = |prefix: Option<&str>| {
+        let mut command = Command::new(&program);
+        command.args(["render", "sky.toml", "-o", "a.png", "--size", "32x18", "--stats"]).current_dir(folder.path());
+        // The system's loader, if it has one, finds no driver.
+        command.env_clear().env("VK_DRIVER_FILES", folder.path().join("none.json"));
+        command.envs(prefix.map(|prefix| ("WELKIN_PREFIX_DIR", root().join(prefix))));
+        command.output().unwrap()
+    };
+    let without = render(None);
+    assert_eq!(without.status.code(), Some(2), "{}", stderr(&without));
+    assert!(stderr(&without).contains("welkin setup"), "{}", stderr(&without));
+    let with = render(Some(".welkin/lavapipe"));
+    assert_eq!(with.status.code(), Some(0), "{}", stderr(&with));
+    let stats: serde_json::Value = serde_json::from_str(&stdout(&with)).unwrap();
+    assert!(stats["device"]["name"].as_str().unwrap().contains("llvmpipe"), "{}", stats["device"]);
+    assert_eq!(stats["validation_messages"], 0, "{}", stderr(&with));
+    let size = image::image_dimensions(folder.path().join("a.png")).unwrap();
+    assert_eq!(size, (32, 18));
+}
