@@ -3,7 +3,7 @@
 //! A method owns its passes and resources. Once a frame it finds the light of all particles, once a picture what visible ones
 //! show of it, and compositing asks its `source.glsl` for the colour of each segment (`glsl/lighting/hit.glsl`). A new one
 //! touches its own folders, [`Lighting`] with its row in [`LIGHTINGS`](crate::params::LIGHTINGS), the scene's keys if it has any,
-//! and [`open`].
+//! and `open`.
 //!
 //! Shaders of any method get shadows at any point from `glsl/lighting/sun_optical_depth.glsl`.
 

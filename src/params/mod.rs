@@ -58,8 +58,8 @@ impl Params {
     /// Checks every field, and that this version has the chosen combination of source, lighting and compositing.
     ///
     /// # Errors
-    /// [`Error::InvalidParam`](crate::Error::InvalidParam) naming the field as a scene file writes it, the value and what
-    /// would have been accepted, or [`Error::Unsupported`](crate::Error::Unsupported) for a choice that is known but not
+    /// [`Error::InvalidParam`] naming the field as a scene file writes it, the value and what
+    /// would have been accepted, or [`Error::Unsupported`] for a choice that is known but not
     /// in this version.
     pub fn validate(&self) -> Result<()> {
         self.camera.validate()?;

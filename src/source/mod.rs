@@ -1,5 +1,5 @@
 //! Where particles come from: one module for each source. A new one touches its own module, [`Source`](crate::params::Source)
-//! with its row in [`SOURCES`](crate::params::SOURCES), and [`open`].
+//! with its row in [`SOURCES`](crate::params::SOURCES), and `open`.
 
 mod grid;
 mod list;
