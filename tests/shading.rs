@@ -13,6 +13,7 @@ use welkin::film::Film;
 use welkin::gpu::standalone::{Options, Standalone};
 use welkin::gpu::{Buffer, BufferKind, Feature, Image, ImageDesc, MethodBindings, Resource, Sampler};
 use welkin::grid::Counters;
+use welkin::lighting::attenuation::volume::AttenuationVolume;
 use welkin::lighting::tables::volume::{LightVolume, VolumeDesign};
 use welkin::lut::{Detail, TableParams, Tables};
 use welkin::params::{Aim, Blend, Camera, Clouds, Lighting, Precision, Style};
@@ -164,12 +165,15 @@ fn render(
     let pixels = (SIZE * SIZE) as usize;
     let bytes = Buffer::new(&gpu, "scene bytes", 16 * pixels as u64, BufferKind::Readback).unwrap();
     let volume = LightVolume::new(&gpu, VolumeDesign::none(), 1).unwrap();
+    let shadows = AttenuationVolume::new(&gpu, None, Precision::F32, 1).unwrap();
     let light = [
         ("lights", Resource::Buffer(&lights)),
         ("sky_light", Resource::Buffer(&sky_light)),
         ("scattering_lut", Resource::Sampled(tables.scattering.image().sampled(Sampler::LinearClamp))),
         ("volume", Resource::Buffer(volume.params(0))),
         ("light_volume", Resource::Sampled(volume.image().sampled(Sampler::LinearClamp))),
+        ("attenuation", Resource::Buffer(shadows.params(0))),
+        ("attenuation_volume", Resource::Sampled(shadows.image().sampled(Sampler::LinearClamp))),
     ];
     let inputs = BlendInputs {
         frame: &frame,
